@@ -54,8 +54,9 @@ LIMITS = {
     # objects named on them, profiles of loads, designs of their elements, a mesh for Foxglove.
     # Skins of any shape: files of meshes and what is wrong with them, finite elements of shells,
     # functions, contacts and designs on them; the dialog that opens one; glTF of every skin.
+    # Several fingers at once: a recording of all by a process of its own, commands for each.
     # Hands of several skins: their description, URDF, the object that they hold, rolling, its map.
-    "statements": 49_200,
+    "statements": 49_700,
     # _files: one way to read and write files; _text: text from outside; _plugins: what other
     # packages add. For all rooms and the app.
     "loose modules of core": 11,

@@ -3,19 +3,20 @@
 import ctypes
 import os
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 
 from cyclopts import App
 
 from kappaskin.cli import (
-    Described,
+    DescribedFingers,
     Limit,
     ProgressLine,
-    SourceName,
+    Sources,
     Switch,
     allow,
     check_output,
-    of_sensor,
+    fingers_of,
 )
 from kappaskin.errors import Refusal, lacking
 from kappaskin_app import DEFAULT_SOURCE
@@ -61,11 +62,11 @@ def run(
     file: Path | None = None,
     /,
     *,
-    source: SourceName = DEFAULT_SOURCE,
+    source: Sources = None,
     seconds: float | None = None,
     screenshot: Path | None = None,
     limit: Limit = "",
-    sensor: Described = None,
+    sensor: DescribedFingers = None,
     trust: Switch = False,
 ) -> None:
     """Open the desktop app on a source of readings, or on a file.
@@ -77,7 +78,8 @@ def run(
     file
         A recording or a scene to play, a calibration of the sensor, or a mesh as the object.
     source
-        `sim:`, `sim:SCENE`, `replay:FILE`, `feed:NAME`, or a port or URL for pyserial.
+        `sim:`, `sim:SCENE`, `replay:FILE`, `feed:NAME`, or a port or URL for pyserial; of a hand
+        NAME=SOURCE for each finger.
     seconds
         Close after this many seconds; the window opens with the default theme and layout.
     screenshot
@@ -88,7 +90,8 @@ def run(
     allow(limit)
     if file is not None and not file.is_file():
         raise Refusal(f"{file}: no such file; check its name")
-    _open(of_sensor(source, sensor), seconds, screenshot, file=file, trust=trust)
+    sources = fingers_of(None if source else DEFAULT_SOURCE, source, sensor)
+    _open(sources, seconds, screenshot, file=file, trust=trust)
 
 
 @demo.default
@@ -109,11 +112,11 @@ def present(*, seconds: float | None = None, screenshot: Path | None = None) -> 
     screenshot
         Save a picture of the window just before it closes.
     """
-    _open("sim:demo", seconds, screenshot, presenting=True)
+    _open({"": "sim:demo"}, seconds, screenshot, presenting=True)
 
 
 def _open(
-    source: str,
+    sources: Mapping[str, str],
     seconds: float | None,
     screenshot: Path | None,
     presenting: bool = False,
@@ -124,12 +127,13 @@ def _open(
         raise Refusal(f"expected seconds above zero, {_LONGEST:g} at most, got {seconds}")
     _require_display()
     if screenshot is not None:
-        check_output(screenshot, *filter(None, [file, source.partition(":")[2]]))
+        named = [source.partition(":")[2] for source in sources.values()]
+        check_output(screenshot, *filter(None, [file, *named]))
         seconds = _SETTLE if seconds is None else seconds
     from kappaskin_app.launch import launch
 
     try:
-        launch(source, seconds, screenshot, presenting, file, trust)
+        launch(sources, seconds, screenshot, presenting, file, trust)
     except ImportError as error:
         raise lacking("app", "the desktop app", error) from error
 
@@ -158,7 +162,7 @@ def replay(
 
     allow(limit)
     with Recording(file):  # or refused here
-        _open(f"replay:{file.absolute()}", seconds, screenshot)
+        _open({"": f"replay:{file.absolute()}"}, seconds, screenshot)
 
 
 def handout(lesson: str, *, out: Path) -> None:

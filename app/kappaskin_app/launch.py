@@ -9,7 +9,7 @@ import os
 import signal
 import sys
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from importlib import import_module
@@ -25,7 +25,7 @@ from kappaskin.errors import Refusal
 if TYPE_CHECKING:
     from PySide6.QtWidgets import QApplication
 
-    from kappaskin.live import Engine
+    from kappaskin.live import Engine, Fingers
     from kappaskin_app.shell.log_files import LogFiles
     from kappaskin_app.shell.recovery import Recovery
     from kappaskin_app.shell.splash import Splash
@@ -45,9 +45,13 @@ _BEHIND = 5  # of 19 steps that drawing stands behind the engine when both want 
 
 
 def opened(
-    source: str, kept: Path | None = None, trusted: frozenset[Path] = frozenset()
+    source: str | Mapping[str, str],
+    kept: Path | None = None,
+    trusted: frozenset[Path] = frozenset(),
 ) -> "tuple[QApplication, MainWindow]":
     """The application and its window, shown, on `source` or on what the last window left.
+
+    Or on the source of each finger of a hand, by their names.
 
     The `trusted` scenes, absolute paths, may name files outside their folders.
 
@@ -59,8 +63,10 @@ def opened(
         application = _application()
         splash = _splash(kept) if kept is not None else None
         # Beside: the engine's process starts while this one loads VTK.
+        fingers = {"": source} if isinstance(source, str) else source
+        first = next(iter(fingers.values()))
         with ThreadPoolExecutor(1) as beside:
-            starting = beside.submit(_connected, source, _scene_of(source) in trusted)
+            starting = beside.submit(_connected, fingers, _scene_of(first) in trusted)
             try:
                 for module, words in _LOADED.items():
                     if splash is not None:
@@ -81,7 +87,8 @@ def opened(
 
         if splash is not None:
             splash.say("Building the window")
-        window = MainWindow(all_features(), source, engine, trusted)
+        window = MainWindow(all_features(), first, engine, trusted)
+        window.session.begin_fingers(fingers)
     except BaseException:
         engine.close()
         raise
@@ -151,25 +158,31 @@ def _scene_of(source: str) -> Path:
     return Path(source.removeprefix("sim:").strip()).absolute()
 
 
-def _connected(source: str, trust: bool) -> "Engine":
-    """An engine that reads `source`, or one that still records for an earlier window."""
-    from kappaskin.live import Engine, resume_folder
+def _connected(sources: Mapping[str, str], trust: bool) -> "Engine | Fingers":
+    """Engines that read `sources`, or one that still records for an earlier window."""
+    from kappaskin.live import Engine, Fingers, resume_folder
 
+    if "" not in sources:
+        fingers = Fingers(sources)
+        fingers.connect(sources, trust)
+        return fingers
     engine = Engine(resume_from=resume_folder())
     if engine.resumed is None:
-        engine.connect(source, trust)
+        engine.connect(sources[""], trust)
     return engine
 
 
 def launch(
-    source: str,
+    sources: Mapping[str, str],
     seconds: float | None = None,
     screenshot: Path | None = None,
     presenting: bool = False,
     file: Path | None = None,
     trust: bool = False,
 ) -> None:
-    """Show the window on `source`; after `seconds` save `screenshot`, if any, and close.
+    """Show the window on `sources`; after `seconds` save `screenshot`, if any, and close.
+
+    They are those of the fingers of a hand by their names, or one without a name.
 
     While it is `presenting`, what is felt fills the screen. A `file` is opened as one dropped is.
     With `trust` the scene of either may name files outside its folder.
@@ -181,9 +194,9 @@ def launch(
         signal.signal(number, lambda got, _: asked.append(got))
     log_files = _logbook()
     # What a script opens for some seconds is the same whatever was before.
-    scenes = (_scene_of(source), Path(file or "").absolute()) if trust else ()
+    scenes = [*map(_scene_of, sources.values()), Path(file or "").absolute()] if trust else []
     window_file = _kept_file() if seconds is None else None
-    application, window = opened(source, window_file, frozenset(scenes))
+    application, window = opened(sources.get("", sources), window_file, frozenset(scenes))
     recovering = _recovering(window)
     full_screen = window.layouts.full_screen
     if presenting and full_screen is not None and not window.session.engine.resumed:

@@ -320,7 +320,7 @@ def remove_folders_left_behind(beside: Path | None = None) -> None:
                     shutil.rmtree(folder, ignore_errors=True)
 
 
-_MEANING = 1  # to be changed by whatever makes other arrays of the same key
+_MEANING = 2  # to be changed by whatever makes other arrays of the same key
 _MOST = 16  # files
 _DIGEST = hashlib.sha256().digest_size  # bytes: what a file begins with
 _LARGEST = 64_000_000  # bytes of one: more is read no faster than it is computed

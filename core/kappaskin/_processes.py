@@ -7,10 +7,13 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Generator, Iterable
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from functools import cache
 from multiprocessing.connection import Connection
 from pathlib import Path
+from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any, Generic, TypeAlias, TypeVar, cast
 
 from kappaskin._files import mark_folder, remove_folders_left_behind
@@ -140,6 +143,30 @@ def _watch_parent() -> None:
         parent.join()
         time.sleep(_GRACE)
         os._exit(1)
+
+
+progress: ContextVar[Callable[[float], None]] = ContextVar("progress", default=lambda _: None)
+"""What long computations call with the share that is done, from 0 to 1."""
+
+
+def with_progress(
+    begin: float, end: float, compute: Callable[..., _Item], *about: object
+) -> Generator[float, None, _Item]:
+    """The shares done from `begin` to `end`, as `compute(*about)` reports; returns its value."""
+    shares = SimpleQueue[float | None]()
+
+    def computed() -> _Item:
+        progress.set(cast("Callable[[float], None]", shares.put))
+        try:
+            return compute(*about)
+        finally:
+            shares.put(None)
+
+    with ThreadPoolExecutor(1) as beside:
+        task = beside.submit(computed)
+        while (share := shares.get()) is not None:
+            yield begin + (end - begin) * share
+        return task.result()
 
 
 def items_of(make: Callable[..., Any], *about: object) -> Generator[Any]:

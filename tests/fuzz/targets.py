@@ -1,5 +1,6 @@
 """What is read from elsewhere: for each reader, how bytes are given to it, and some it likes."""
 
+import base64
 import io
 import socket
 import tomllib
@@ -38,6 +39,7 @@ from kappaskin.recording import Recorder, Repaired, ReplayedSource, Verification
 from kappaskin.recording.messages import TOPICS
 from kappaskin.scenes import SCENES, read_scene
 from kappaskin.scenes.effects import SECOND_GENERATION_LOOPS, Creep
+from kappaskin.skin import MeshSkin
 from kappaskin.sources import Decoder, SimulatedSource, information
 from kappaskin.sources.decoder import FROM_DEVICE, FROM_HOST
 from kappaskin.sources.wire import (
@@ -258,6 +260,19 @@ def _mesh(kind: str) -> Read:
     return read
 
 
+def _mesh_text(data: bytes, _: Path) -> None:
+    """The text of a mesh, also of one with any nodes (n, 3) and any numbers after them."""
+    n = 12 * (data[0] if data else 0)
+    nodes = np.frombuffer(data[1 : n + 1].ljust(n, b"\0"), "<f4").reshape(-1, 3)
+    rest = data[n + 1 :]
+    steps = np.frombuffer(rest[: len(rest) // 4 * 4], "<i4")
+    written = io.BytesIO()
+    np.savez(written, nodes=nodes, steps=steps, held=steps[:3], thickness=np.array(1e-3))
+    for text in (data, base64.b85encode(written.getvalue())):
+        with suppress(Refusal):
+            MeshSkin.of_text(text.decode(errors="replace"))
+
+
 def _map(kind: str) -> Read:
     def read(data: bytes, folder: Path) -> None:
         path = folder / f"a.{kind}"
@@ -301,6 +316,10 @@ _ASCII = (
     b"solid a\n" + b"facet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 9 0 0\nvertex 0 9 0\n"
     b"endloop\nendfacet\n" * 4 + b"endsolid a\n"
 )
+_FLAT = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], "<f4") / 100
+_FACES = np.array([[0, 1, 2], [0, 2, 3]])
+_SQUARE = b"\x04" + _FLAT.tobytes() + np.diff(_FACES.ravel(), prepend=0).astype("<i4").tobytes()
+_MESH_TEXT = MeshSkin(_FLAT, _FACES, 1e-3).text
 _BINARY = bytes(80) + (4).to_bytes(4, "little") + bytes(4 * 50)
 
 # Recordings
@@ -450,6 +469,7 @@ TARGETS = (
     Target(
         "stl", _mesh("stl"), (_ASCII, _BINARY), (*_NUMBERS, b"\nfacet ", b"\nvertex ", b"\xff" * 4)
     ),
+    Target("mesh text", _mesh_text, (_SQUARE, _MESH_TEXT.encode()), _NUMBERS),
     Target(
         "npy",
         _map("npy"),

@@ -7,7 +7,7 @@ from math import pi, radians, sqrt
 import numpy as np
 import pytest
 
-from kappaskin import Plate, SensorLayout
+from kappaskin import GaussianLoad, Plate, SensorLayout, basis_for, load_scene
 from kappaskin.contact.influence import influence_of
 from kappaskin.skin import MeshSkin
 from koiter import Panel
@@ -115,24 +115,77 @@ def test_intervals_on_a_mesh_of_a_cap_cover_the_truth(mm, force, frames):
         assert 0.92 - slack <= share <= 0.98 + slack
 
 
+# Gages of some length: the mean of the shell's curvature along great circles
+
+
+def _along_circles(mesh, positions, turns, far):
+    """Places and unit vectors along the sphere (P, 2) so far along great circles, as turned."""
+    x, y = (positions - mesh.places[0]).T / R
+    out = np.column_stack([x, y, np.sqrt(1 - x * x - y * y)])
+
+    def frame(out):
+        e_x = np.cross([0.0, 1.0, 0.0], out)
+        e_x /= np.linalg.norm(e_x, axis=1)[:, None]
+        return e_x, np.cross(out, e_x)
+
+    e_x, e_y = frame(out)
+    way = np.cos(turns)[:, None] * e_x + np.sin(turns)[:, None] * e_y
+    c, s = np.cos(far / R), np.sin(far / R)
+    there, onward = c * out + s * way, c * way - s * out
+    ways = np.stack([np.vecdot(onward, each) for each in frame(there)], axis=-1)
+    return mesh.places[0] + R * there[:, :2], ways
+
+
+@pytest.mark.full
+def test_gages_on_a_mesh_read_the_mean_along_them():
+    length, case, count = 2e-3, _case(1, 1.0, 1e-3, 24), 12
+    mesh, k = case.skin.patch, np.arange(count)
+    turns = np.random.default_rng(0).uniform(-pi, pi, count)
+    places = _on(mesh, R * _even((k + 0.5) / count, 0.8 * case.angle), k * pi * (3 - sqrt(5)))
+    layout = SensorLayout.scattered(mesh, places).reading(k, "curvature").turned(turns)
+    out = np.zeros((4, count))
+    influence = influence_of(case.skin, replace(layout, gage_length=length), "clamped", 15, out)
+    steps = length * np.linspace(-0.5, 0.5, 9)
+    weights = np.array([1, *[4, 2] * 3, 4, 1]) / 24  # Simpson's rule
+
+    for share in (0.1, 0.5):
+        load = case.load((share, 0.2))
+
+        def read(far, load=load):
+            at, ways = _along_circles(mesh, places, turns, far)
+            xx, yy, xy = case.truth(SensorLayout.scattered(mesh, at))(load)
+            c, s = ways.T
+            return c * c * xx + 2 * c * s * xy + s * s * yy
+
+        mean = sum(w * read(far) for w, far in zip(weights, steps, strict=True))
+        influence.at(load.x, load.y, load.radius**2)
+
+        scale = np.linalg.norm(mean)
+        assert np.linalg.norm(out[0] / influence.unit - mean) < 0.02 * scale
+        assert np.linalg.norm(read(0.0) - mean) > 0.1 * scale
+
+
 # An ellipsoid, on two meshes of which none has the nodes of the other
 
 AXES, ANGLE, H, D = (9e-3, 7e-3, 6e-3), radians(60), 1e-3, 3.7e-3
 
 
-def _solid(rings):
-    places, triangles = disk(rings)
+def _solid(rings, axes=AXES, angle=ANGLE, rigidity=D, held=pi):
+    """Held where the turn of the rim is at most `held`."""
+    places, triangles = disk(rings, (held, -held) if held < pi else ())
+    corners = len(places)
     places, triangles = quadratic(places, triangles)
-    rim = np.hypot(*places[: 1 + 3 * rings * (rings + 1)].T) > 1 - 1e-9
+    rim = np.hypot(*places[:corners].T) > 1 - 1e-9
     far, turn = np.hypot(*places.T), np.arctan2(*places.T[::-1])
     ends = rim[triangles[:, :3]]
     on = np.concatenate([rim, np.zeros(len(places) - len(rim), bool)])
     on[triangles[:, 3:][ends & np.roll(ends, -1, axis=1)]] = True
-    t = ANGLE * np.where(on, 1.0, far)
+    t = angle * np.where(on, 1.0, far)
     unit = np.column_stack([np.sin(t) * np.cos(turn), np.sin(t) * np.sin(turn), np.cos(t)])
-    normals = unit / AXES
+    normals = unit / axes
     normals /= np.linalg.norm(normals, axis=1)[:, None]
-    return SolidShell(unit * AXES, normals, triangles, np.flatnonzero(on), D, H)
+    on &= np.abs(turn) < held + 1e-9
+    return SolidShell(unit * axes, normals, triangles, np.flatnonzero(on), rigidity, H)
 
 
 @pytest.mark.full
@@ -156,6 +209,105 @@ def test_readings_on_an_ellipsoid_are_those_of_a_solid_shell():
 
         assert np.linalg.norm(ours - true) < 0.02 * np.linalg.norm(true)
         assert ours @ true == pytest.approx(true @ true, rel=0.01)
+
+
+# The scene thumb-pad, an ellipsoid of which a third of the rim is held
+
+PAD = load_scene("thumb-pad")
+PAD_ANGLE = radians(75)
+PAD_AXES = np.array([9e-3, 7e-3, 6e-3]) / [
+    np.sin(PAD_ANGLE),
+    np.sin(PAD_ANGLE),
+    1 - np.cos(PAD_ANGLE),
+]
+
+
+class _PadTruth:
+    """Of the elements in the middle of the triangles nearest to those of the scene."""
+
+    def __init__(self, rings):
+        mesh = PAD.plate.patch
+        self.top = mesh.places[mesh.points[:, 2].argmax()]
+        self.solid = _solid(rings, PAD_AXES, PAD_ANGLE, PAD.plate.rigidity, pi / 3)
+        at = self.solid.places(np.arange(len(self.solid.triangles)))[:, :2] + self.top
+        near = np.linalg.norm(at[:, None] - PAD.layout.positions, axis=2)
+        elements = np.unique(near.argmin(axis=0))
+        self.layout = SensorLayout.scattered(mesh, at[elements])
+        self.read = self.solid.reader(elements)
+
+    def forces(self, load):
+        x, y = (np.array([load.x, load.y]) - self.top) / PAD_AXES[:2]
+        middle = np.array([x, y, sqrt(1 - x**2 - y**2)]) * PAD_AXES
+        forces = self.solid.spread(
+            lambda at: np.exp(-np.sum((at - middle) ** 2, -1) / (2 * load.sd**2))
+        )
+        return load.force * forces / forces.sum()
+
+    def load(self, share, sd=0.8e-3):
+        t, turn = 0.85 * PAD_ANGLE * sqrt(share[0]), 2 * pi * share[1]
+        way = np.array([np.cos(turn), np.sin(turn)])
+        return Load(*(self.top + np.sin(t) * way * PAD_AXES[:2]), 0.06, sd=sd)
+
+
+@cache
+def _pad_truth(rings):
+    return _PadTruth(rings)
+
+
+@pytest.mark.full
+def test_a_pad_held_along_a_third_of_its_rim_moves_and_bends_as_a_solid_shell():
+    truth, mesh = _pad_truth(18), PAD.plate.patch
+    layout, out = truth.layout, np.zeros((4, truth.layout.channels))
+    influence = influence_of(PAD.plate, layout, "clamped", 15, out)
+    basis = basis_for(mesh, "clamped", 15, 15)
+    inside = np.tile(mesh.depth(layout.positions) > 0.1 * mesh.a, 3)
+    places = truth.solid.points[:, :2] + truth.top
+    on = mesh.contains(places)
+
+    for share in ((0.01, 0.0), (0.3, 0.1), (0.6, 0.4), (0.3, 0.95), (0.3, 0.5)):
+        load = truth.load(share)
+        forces = truth.forces(load)
+        true, w = truth.read(forces).ravel(), truth.solid.displacement(forces)[on]
+        influence.at(load.x, load.y, 4 * load.sd**2)
+        ours = load.force * (out[0] + influence.profile(4 * load.sd**2)[0]) / influence.unit
+        c = PAD.plate.deflection([GaussianLoad(load.x, load.y, load.sd, load.force)], basis)
+        moved = basis.at(places[on]) @ c.ravel()
+
+        assert np.linalg.norm(moved - w) < 0.025 * np.linalg.norm(w)
+        assert np.linalg.norm((ours - true)[inside]) < 0.05 * np.linalg.norm(true[inside])
+        assert np.linalg.norm(ours - true) < 0.1 * np.linalg.norm(true)
+        assert ours @ true == pytest.approx(true @ true, rel=0.03)
+
+
+@dataclass(frozen=True, eq=False)
+class PadCase(Case):
+    @property
+    def layout(self):
+        return _pad_truth(18).layout
+
+
+@pytest.mark.full
+def test_intervals_on_a_pad_held_along_a_third_of_its_rim_cover_the_truth():
+    truth = _pad_truth(18)
+    case = PadCase(
+        "thumb-pad",
+        PAD.plate,
+        lambda layout: lambda load: truth.read(truth.forces(load)),
+        truth.load,
+        edge="clamped",
+        low=0,
+        high=1,
+        noise=0.1 * sqrt(3),
+        bound=False,
+    )
+
+    found = coverage(case, FEW)
+
+    slack = 2 * sqrt(0.95 * 0.05 / FEW)
+    assert found.found == 1
+    assert abs(found.bias) < 0.02
+    for share in (found.x, found.y, found.force):
+        assert 0.92 - slack <= share <= 0.98 + slack
 
 
 # A shallow dome, held all around

@@ -19,6 +19,7 @@ from kappaskin_app.features.design import DesignFeature
 from kappaskin_app.features.estimator import EstimatorFeature
 from kappaskin_app.features.export import ExportFeature
 from kappaskin_app.features.guide import GuideFeature
+from kappaskin_app.features.hand import HandFeature
 from kappaskin_app.features.health import HealthFeature
 from kappaskin_app.features.heatmaps import HeatmapsFeature
 from kappaskin_app.features.lessons import LessonsFeature
@@ -51,6 +52,7 @@ FEATURES: tuple[Callable[[], Feature], ...] = (
     StabilityFeature,
     HealthFeature,
     ContactFeature,
+    HandFeature,
     LogFeature,
     CompareFeature,
     DesignFeature,

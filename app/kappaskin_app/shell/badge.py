@@ -7,7 +7,10 @@ from PySide6.QtGui import QColor, QFontInfo, QMouseEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QToolBar, QVBoxLayout, QWidget
 
 from kappaskin.live import Status
+from kappaskin.pipeline import Setup
 from kappaskin.recording import RecordingStatus, Replay
+from kappaskin.sensing import Sensor
+from kappaskin.skin import MeshSkin
 from kappaskin_app.shell.settings.shown import METHOD_SHORT
 from kappaskin_app.theme import Theme, current
 from kappaskin_app.widgets.parts import Label, plain_tip, sentence
@@ -170,16 +173,23 @@ def _replayed(replay: Replay, saturated: bool) -> str:
     return is_now(REPLAY, gap=gap, saturated=saturated, paused=over or not replay.speed)
 
 
+def functions_of(setup: Setup, sensor: Sensor | None) -> str:
+    """The number of functions: in x and y, or of all on a mesh, which has neither."""
+    patch = None if sensor is None else sensor.layout.patch
+    if isinstance(patch, MeshSkin):
+        return str(setup.Ni * setup.Nj)
+    return f"{setup.Ni} x {1 if patch is not None and patch.strip else setup.Nj}"
+
+
 def in_use(status: Status) -> str:
     """Why the requested setup is not in use, and which one is; empty when it is in use."""
     if not status.refusal:
         return ""
     if status.slot is None:
         return f"No setup is in use. {sentence(status.refusal)}"
-    setup, sensor = status.setup, status.sensor
-    across = 1 if sensor is not None and sensor.layout.patch.strip else setup.Nj
+    setup, functions = status.setup, functions_of(status.setup, status.sensor)
     method = METHOD_SHORT.get(setup.method, setup.method)
-    return f"In use: {method}, {setup.Ni} x {across} functions. {sentence(status.refusal)}"
+    return f"In use: {method}, {functions} functions. {sentence(status.refusal)}"
 
 
 class Header(QToolBar):

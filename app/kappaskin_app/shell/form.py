@@ -21,6 +21,7 @@ from PySide6.QtWidgets import (
     QComboBox,
     QDoubleSpinBox,
     QFormLayout,
+    QLabel,
     QLineEdit,
     QMenu,
     QSizePolicy,
@@ -54,6 +55,7 @@ def for_the_window(event: QEvent) -> bool:
 
 Pairs = tuple[tuple[str, str], ...]  # values with their labels
 _NONE = "None"
+_ON_MESH = "Functions, N =", "\N{MULTIPLICATION SIGN}"
 _TICKS = (Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Space)
 
 
@@ -396,6 +398,13 @@ class Form(Panel):
     def has_row(self, name: str) -> bool:
         """Whether the row of a setting is shown."""
         return self.form.isRowVisible(self._fields[name])
+
+    def show_functions(self, along_x: str, along_y: str, on_mesh: bool) -> None:
+        """Name both numbers of functions: their product is N on a mesh, which has no x and y."""
+        names = _ON_MESH if on_mesh else [form_field(name).label for name in (along_x, along_y)]
+        for name, words in zip((along_x, along_y), names, strict=True):
+            if isinstance(label := self.form.labelForField(self._fields[name]), QLabel):
+                label.setText(words)
 
     def offer(self, name: str, values: Collection[str]) -> None:
         """Enable only these values of the choice called `name`."""

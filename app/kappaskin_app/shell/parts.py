@@ -4,7 +4,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QMainWindow
 
 from kappaskin._text import printable
-from kappaskin.live import Engine
+from kappaskin.live import Engine, Fingers
 from kappaskin_app.guard import log
 from kappaskin_app.shell.actions import Actions
 from kappaskin_app.shell.background import Tasks
@@ -41,7 +41,7 @@ class Parts(QMainWindow):
     closing = Signal()
     closed = Signal()
 
-    def __init__(self, settings: Settings, engine: Engine | None = None) -> None:
+    def __init__(self, settings: Settings, engine: Engine | Fingers | None = None) -> None:
         super().__init__()
         self.history = History(settings, self)
         self.tasks = Tasks(self)

@@ -14,6 +14,7 @@ from kappaskin._files import write_whole
 from kappaskin._text import printable
 from kappaskin.errors import Refusal
 from kappaskin.live import Status
+from kappaskin_app.shell.badge import functions_of
 from kappaskin_app.shell.folders import proposed
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.work_dialog import has_suffix, with_ending
@@ -29,7 +30,7 @@ def caption_of(status: Status, at: float, now: datetime) -> str:
     parts = [f"kappaskin {metadata.version('kappaskin')}", f"{now:%Y-%m-%d %H:%M:%S}"]
     if sensor is not None:
         parts += [f"{sensor.name} {sensor.serial_number}", f"{at:.3f} s"]
-        parts.append(f"{setup.Ni} x {setup.Nj} functions, {setup.method}")
+        parts.append(f"{functions_of(setup, sensor)} functions, {setup.method}")
         for name, found in (("calibration", setup.calibration), ("tare", setup.tare)):
             if found is not None:
                 parts.append(f"{name} of {found.date:%Y-%m-%d %H:%M} ({found.digest[:8]})")

@@ -15,12 +15,13 @@ from PySide6.QtCore import QLockFile, QObject
 
 from kappaskin._files import user_folder, write_whole
 from kappaskin.errors import Refusal
-from kappaskin.live import Engine, ResumeInfo, Status
+from kappaskin.live import ResumeInfo, Status
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.background import BackgroundSave
 from kappaskin_app.shell.centre import BannerAction
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.parts import Parts
+from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.settings.scene import Written
 from kappaskin_app.shell.simulation import settings_for
@@ -87,15 +88,15 @@ def _value(name: str, value: Any) -> Any:
 class SettingsHandover:
     """Hands the settings to the engine, which may outlive the window while it records."""
 
-    def __init__(self, history: History, engine: Engine) -> None:
-        self._history, self._engine = history, engine
+    def __init__(self, history: History, session: Session) -> None:
+        self._history, self._session = history, session
         self._left: Settings | None = None
 
     def follow(self, status: Status) -> None:
         settings = self._history.settings
         if status.recording.active and settings is not self._left:
             self._left = settings
-            self._engine.store_window_state(settings_text(settings).encode())
+            self._session.engine.store_window_state(settings_text(settings).encode())
 
 
 def settings_left(left: ResumeInfo) -> Settings:

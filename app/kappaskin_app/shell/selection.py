@@ -1,8 +1,11 @@
-"""Selection on the skin: elements, positions, the load and modes, shared by all views."""
+"""Selection on the skin: elements, positions, the load and maps, shared by all views."""
 
-from typing import Any
+from typing import NamedTuple
 
 from PySide6.QtCore import QObject, Signal
+
+from kappaskin.frames import Array
+from kappaskin_app.widgets.tint import Tint
 
 
 class LoadHandle(QObject):
@@ -20,12 +23,25 @@ class LoadHandle(QObject):
     replaced = Signal(object, float, float, float)
 
 
+class SkinMap(NamedTuple):
+    """What colours the skin instead of the estimate: `values` (ny, nx) by a `tint`.
+
+    `words` describe it, `label` stands at its scale. `positions` (P, 2) in m are those of its own
+    elements, if any.
+    """
+
+    values: Array
+    tint: Tint
+    words: str
+    label: str = ""
+    positions: Array | None = None
+
+
 class Selection(QObject):
-    """The element under the mouse, the target of the press test, and a mode that is shown.
+    """The element under the mouse, the target of the press test, and a map that is shown.
 
     `chosen` brings an element that was clicked on a map, `over` and `clicked` a position (x, y) in
-    m on the skin under the mouse (None: none) or clicked. `mode` (ny, nx) from -1 to 1 colours the
-    skin instead of the estimate; `mode_words` describe it.
+    m on the skin under the mouse (None: none) or clicked. `map` colours the skin, if any.
     """
 
     pointed = Signal(int)
@@ -33,14 +49,13 @@ class Selection(QObject):
     chosen = Signal(int)
     over = Signal(object)
     clicked = Signal(float, float)
-    mode_changed = Signal()
+    map_changed = Signal()
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self.load = LoadHandle(self)
         self.element = self.target = -1
-        self.mode: Any = None
-        self.mode_words = ""
+        self.map: SkinMap | None = None
 
     def point(self, element: int) -> None:
         """Highlight an element in every view; -1 none."""
@@ -53,7 +68,7 @@ class Selection(QObject):
         self.target = element
         self.target_changed.emit(element)
 
-    def show_mode(self, mode: Any, words: str = "") -> None:
-        """Colour the skin by a mode, or by the estimate if None."""
-        self.mode, self.mode_words = mode, words if mode is not None else ""
-        self.mode_changed.emit()
+    def show_map(self, shown: SkinMap | None) -> None:
+        """Colour the skin by a map, or by the estimate if None."""
+        self.map = shown
+        self.map_changed.emit()

@@ -3,7 +3,7 @@
 import math
 import time
 from collections import deque
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -16,7 +16,7 @@ from kappaskin.calibration import Calibration, Tare
 from kappaskin.errors import Refusal
 from kappaskin.estimation import Region, ScanTradeoff
 from kappaskin.frames import Estimate
-from kappaskin.live import STREAMING, Engine, ResumeInfo, Status
+from kappaskin.live import STREAMING, Engine, Fingers, ResumeInfo, Status
 from kappaskin.mechanics import Plate, PointLoad
 from kappaskin.pipeline import Setup
 from kappaskin.scenes import Scene
@@ -45,6 +45,7 @@ from kappaskin_app.shell.simulation import (
     region_of,
     scene_of,
     scene_or_refusal,
+    settings_for,
     source_settings,
 )
 
@@ -130,6 +131,7 @@ _NOTICE = 60.0  # s for which a replaced device is reported
 _STATUS = 0.05  # s between two polls of the status
 
 
+_FINGERS = 1_000_000  # connections of one finger at most: no two fingers have one number
 _BASE = Setup()
 
 
@@ -162,6 +164,9 @@ def _turn(region: Region) -> float:
 class Session(QObject):
     """Owns the engine. `estimated` brings each new estimate, `reported` the status, in one tick.
 
+    Of a hand it owns the engines of all `fingers`, and is that of one of them, `finger`, until
+    `show_finger` changes to another: as to another source, with the settings of that finger.
+
     `scene` is the simulated one, `running` whether it is not paused. `playing` reports another
     scene, `refused` and `refusal` why it is not that of the settings (empty when it is), and
     `preparing` whether it is still computed. `publish_refused` reports why nothing is published
@@ -178,6 +183,7 @@ class Session(QObject):
     source_changing = Signal()
     source_changed = Signal(str)
     source_refused = Signal(str)
+    finger_changed = Signal(str)
     pause_requested = Signal()
     time_requested = Signal(float)
     playing = Signal(Scene)
@@ -186,9 +192,18 @@ class Session(QObject):
     reported = Signal(Status)
 
     def __init__(
-        self, history: History, engine: Engine, tasks: Tasks, parent: QObject | None = None
+        self,
+        history: History,
+        engine: Engine | Fingers,
+        tasks: Tasks,
+        parent: QObject | None = None,
     ) -> None:
         super().__init__(parent)
+        self.fingers = engine if isinstance(engine, Fingers) else None
+        engines = {"": engine} if isinstance(engine, Engine) else engine.engines
+        self.finger, engine = next(iter(engines.items()))
+        self._others = dict[str, tuple[str, Settings]]()
+        """Source and settings of each finger that is not shown."""
         self._history = history
         self._settings = history.settings
         self.trusted: frozenset[Path] = frozenset()
@@ -320,6 +335,35 @@ class Session(QObject):
         self._restarts = True
         self._history.change(f"Play {written.file.stem}", -1, written=written)
         self._play()
+
+    def begin_fingers(self, sources: Mapping[str, str]) -> None:
+        """Begin with the `sources` of a hand, which its engines read already."""
+        self._others = {
+            finger: (source, settings_for(source, self._trusts(source)))
+            for finger, source in sources.items()
+            if finger != self.finger
+        }
+
+    def show_finger(self, finger: str) -> None:
+        """Show another finger of the hand: its readings, with its settings.
+
+        What could be undone was of the settings of the last one.
+        """
+        if self.fingers is None or finger not in self._others:
+            return
+        self.source_changing.emit()
+        self._others[self.finger] = self.source, self._history.settings
+        self.finger, self.engine = finger, self.fingers.engines[finger]
+        self.source, settings = self._others.pop(finger)
+        self.connecting, self.estimate, self._seek_target = "", None, None
+        self.running, self._next_status = bool(self.engine.requested.speed), 0.0
+        self._turned_at, self._lost_since = time.monotonic(), math.inf
+        self._history.apply(settings)
+        self._history.stack.clear()
+        self.source_changed.emit(self.source)
+        if self.inside:
+            self._play()
+        self.finger_changed.emit(finger)
 
     def disconnect_from(self) -> None:
         self.connecting = ""
@@ -469,8 +513,9 @@ class Session(QObject):
         now, connections = time.monotonic(), self.status.connections
         if reports := now >= self._next_status:
             self._next_status = now + _STATUS
-            self.engine.revive()
-            self.status = self.engine.status()
+            for engine in self.fingers.engines.values() if self.fingers else (self.engine,):
+                engine.revive()
+            self.status = self._of_hand(self.engine.status())
             self._lost_since = min(self._lost_since, now) if self._lost else math.inf
             if self.status.connections != connections:
                 self.estimate = None  # the estimate was of the last sensor
@@ -493,6 +538,23 @@ class Session(QObject):
             self.estimated.emit(estimate)
         if self.timer.isActive():
             self.timer.start(_DRAWN if shown else _TICK)
+
+    def _of_hand(self, status: Status) -> Status:
+        """The status with a number of connections that no other finger has, and the hand's file."""
+        if self.fingers is None:
+            return status
+        first = _FINGERS * list(self.fingers.engines).index(self.finger)
+        recording = self.fingers.recording
+        return replace(status, connections=first + status.connections, recording=recording)
+
+    def record(self, path: Path | None) -> None:
+        """Record to `path` from now on, a hand with all its fingers; None ends that."""
+        if self.fingers is None:
+            self.engine.record(path)
+        elif path is None:
+            self.fingers.stop_recording()
+        else:
+            self.fingers.record(path)
 
     @property
     def _lost(self) -> bool:
@@ -528,4 +590,4 @@ class Session(QObject):
     def close(self) -> None:
         self.timer.stop()
         self.closed = True
-        self.engine.close()
+        (self.fingers or self.engine).close()

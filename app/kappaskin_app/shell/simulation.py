@@ -293,7 +293,7 @@ def with_consequences(settings: Settings, scene: Scene, name: str, value: Any) -
     changed: dict[str, Any] = {name: value}
     if name == "shape":
         changed |= {**SHAPES[value].lengths, **SHAPES[value].defaults}
-    if name == "design_shape":
+    if name == "design_shape" and value in SHAPES:
         changed |= {f"design_{name}": length for name, length in SHAPES[value].lengths.items()}
         changed |= {"design_pattern": "spiral" if value == "cap" else "grid"}
         changed |= {"design_place": "scene"} if value == "strip" else {}

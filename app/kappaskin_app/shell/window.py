@@ -7,7 +7,7 @@ from typing import Protocol
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QCloseEvent, QKeyEvent, QResizeEvent
 
-from kappaskin.live import Engine, ResumeInfo, Status
+from kappaskin.live import Engine, Fingers, ResumeInfo, Status
 from kappaskin_app import DEFAULT_SOURCE
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.menus import Menus
@@ -42,10 +42,10 @@ class MainWindow(Parts):
         self,
         features: Sequence[Feature],
         source: str = "sim:",
-        engine: Engine | None = None,
+        engine: Engine | Fingers | None = None,
         trusted: frozenset[Path] = frozenset(),
     ) -> None:
-        handed = engine.resumed if engine else None
+        handed = engine.resumed if isinstance(engine, Engine) else None
         if handed and source in ("sim:", DEFAULT_SOURCE):  # no other source was requested
             source = handed.requested.source or source
         super().__init__(settings_left(handed) if handed else settings_for(source), engine)

@@ -223,5 +223,6 @@ class SkinScale(QWidget):
         """Show what colours the skin: name, `symbol` in HTML and tooltip."""
         if (name, symbol) != self._shown:
             self._shown = name, symbol
+            name = name.replace(" ", "\N{NO-BREAK SPACE}")  # one line
             self.what.setText(name if name == symbol else f"{name} <b>{symbol}</b>")
             self.what.setToolTip(tip)

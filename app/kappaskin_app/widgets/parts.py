@@ -28,7 +28,7 @@ def capital(text: str) -> str:
 def sentence(text: str) -> str:
     """The text with a capital, as `capital` sets it, and a stop."""
     text = capital(text)
-    return text if not text or text.endswith((".", "?", "!")) else f"{text}."
+    return text if not text or text.endswith((".", "?", "!", ELLIPSIS)) else f"{text}."
 
 
 def plain_tip(text: str) -> str:

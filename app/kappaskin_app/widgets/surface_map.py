@@ -26,6 +26,7 @@ class _Map(QWidget):
         self._image: QImage | None = None
         self._contact, self._sides, self._faded = np.full(2, np.nan), (1.0, 1.0), False
         self._points: Array | None = None
+        self._outline: Array | None = None
 
     def sizeHint(self) -> QSize:
         return QSize(180, 180)
@@ -45,9 +46,9 @@ class _Map(QWidget):
         self._contact, self._sides = contact, sides
         self.update()
 
-    def show_points(self, positions: Array | None) -> None:
-        """Mark places (P, 2) in m on the skin, or none."""
-        self._points = positions
+    def show_points(self, positions: Array | None, outline: Array | None = None) -> None:
+        """Mark places (P, 2) in m on the skin, or none, within its `outline` (k, 2), else a box."""
+        self._points, self._outline = positions, outline
         self.update()
 
     def show_faded(self, faded: bool) -> None:
@@ -73,7 +74,11 @@ class _Map(QWidget):
             painter.drawImage(area, self._image)
             painter.setOpacity(1.0)
         painter.setPen(QPen(QColor(current().line), 1))
-        painter.drawRect(area)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing, self._outline is not None)
+        if self._outline is None:
+            painter.drawRect(area)
+        else:
+            painter.drawPolygon([self._at(area, *at) for at in self._outline.tolist()])
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         if self._points is not None:
             painter.setPen(QPen(QColor(DARK_INK), 1))

@@ -178,7 +178,7 @@ class PointMap:
         column = np.full(values.shape[1], len(on))
         column[on] = np.arange(len(on))
         nan = np.full((len(values), 1), np.nan)
-        of_skin = np.hstack([values[:, on], nan]).astype(np.float32)
+        of_skin = np.hstack([values[:, on], nan]).astype(np.float32, "C")
         return cls(of_skin, column.reshape(len(y), len(x)))
 
     def __call__(self, coefficients: Array) -> Array:

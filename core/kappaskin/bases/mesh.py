@@ -8,6 +8,7 @@ import scipy
 from numpy.typing import NDArray
 
 from kappaskin._files import cached
+from kappaskin._processes import progress
 from kappaskin.bases.facets import Facets, Factored, held_freedoms
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
@@ -15,7 +16,8 @@ from kappaskin.skin import MeshSkin
 
 _LOADS = 2  # for each function
 _WIDTH = 0.7  # of the distance between two loads: the standard deviation of one
-_FEWEST = 2  # nodes for each load
+_REPORTED = 48  # loads solved between two reports of progress
+_SOLVED = 0.6  # of the time that functions take: solving
 _USUAL = 225  # functions made at once, of which fewer are the first
 _POISSON = 0.3  # of the skin whose shapes these are
 
@@ -33,14 +35,31 @@ def _factored(
     mesh: MeshSkin, edge: str, rigidity: float, poisson: float, foundation: float
 ) -> Factored:
     held = held_freedoms(mesh.held, edge, len(mesh.points))
-    return Factored(stiffness(mesh, rigidity, 1.0, poisson, foundation), held)
+    return Factored(stiffness(mesh, edge, rigidity, 1.0, poisson, foundation), held)
 
 
-def stiffness(mesh: MeshSkin, D: float, C: float, nu: float, k_f: float) -> Any:
+def stiffness(mesh: MeshSkin, edge: str, D: float, C: float, nu: float, k_f: float) -> Any:
     """Stiffness (6 n, 6 n) of a shell of D in N m, C in N/m, nu and a foam of k_f in N/m^3."""
-    facets = Facets(mesh.points, mesh.triangles)
+    points = _with_ends_moved(mesh) if edge == "clamped" else mesh.points
+    facets = Facets(points, mesh.triangles)
     K = facets.stiffness(D, C, nu)
     return K + facets.foundation(k_f) if k_f else K
+
+
+# Where the clamped part of a rim ends, curvature grows without bound. Triangles there hold the skin
+# as if that part went on by a quarter of its last side: its end is moved back as far.
+_BEYOND = 0.25
+
+
+def _with_ends_moved(mesh: MeshSkin) -> Array:
+    """The nodes (n, 3) in m, the ends of held parts of the rim moved along it."""
+    held = np.isin(mesh.rim, mesh.held)
+    points = mesh.points.copy()
+    for way in (1, -1):
+        end = held & ~np.roll(held, way) & np.roll(held, -way)
+        ends, inner = mesh.rim[end], np.roll(mesh.rim, -way)[end]
+        points[ends] += _BEYOND * (mesh.points[inner] - mesh.points[ends])
+    return points
 
 
 def inward(mesh: MeshSkin) -> Array:
@@ -68,7 +87,7 @@ class MeshFunctions:
     """
 
     def __init__(self, mesh: MeshSkin, edge: str, count: int) -> None:
-        most = len(mesh.points) // (_FEWEST * _LOADS)
+        most = mesh.most_functions
         if count > most:
             raise Refusal(
                 f"expected at most {most} functions on a mesh of {len(mesh.points)} nodes, got "
@@ -88,7 +107,7 @@ class MeshFunctions:
         own = C * np.diag(self._own)
         if nu == _POISSON and not k_f and np.isclose(D / C, _rigidity(self._mesh), rtol=1e-9):
             return own
-        K = stiffness(self._mesh, D, C, nu, k_f)
+        K = stiffness(self._mesh, self._edge, D, C, nu, k_f)
         moved = _moved(self._mesh, self._edge, len(self._own))
         found = moved.T @ (K @ moved)
         return (found + found.T) / 2
@@ -125,8 +144,15 @@ def _shapes(mesh: MeshSkin, edge: str, count: int) -> tuple[Array, Array]:
     middles = mesh.points[mesh.spread(loads)]
     squares = scipy.spatial.distance.cdist(mesh.points, middles, "sqeuclidean")
     forces = np.exp(-squares / (2 * _WIDTH**2 * area / loads)) * mesh.areas[:, None]
-    felt = pressed(mesh, forces / forces.sum(axis=0))
-    moved = factored(mesh, edge, _rigidity(mesh), _POISSON)(felt)
+    felt, solve = (
+        pressed(mesh, forces / forces.sum(axis=0)),
+        factored(mesh, edge, _rigidity(mesh), _POISSON),
+    )
+    moved = np.empty_like(felt)
+    for k in range(0, loads, _REPORTED):
+        progress.get()(_SOLVED * k / loads)
+        moved[:, k : k + _REPORTED] = solve(felt[:, k : k + _REPORTED])
+    progress.get()(_SOLVED)
     f = along_normals(mesh, moved)
     mass = 4 / area * (f.T * mesh.areas) @ f
     softest = cast("Any", scipy.linalg.eigh)(felt.T @ moved, mass, subset_by_index=(0, count - 1))
@@ -135,7 +161,7 @@ def _shapes(mesh: MeshSkin, edge: str, count: int) -> tuple[Array, Array]:
 
 @lru_cache(1)
 def _moved(mesh: MeshSkin, edge: str, count: int) -> Array:
-    total = max(count, min(_USUAL, len(mesh.points) // (_FEWEST * _LOADS)))
+    total = max(count, min(_USUAL, mesh.most_functions))
     return _shapes(mesh, edge, total)[0][:, :count]
 
 

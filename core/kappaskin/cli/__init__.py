@@ -13,14 +13,14 @@ from cyclopts import App, CycloptsError, Group
 
 from kappaskin.cli.common import FAILED as FAILED
 from kappaskin.cli.common import REFUSED as REFUSED
-from kappaskin.cli.common import Described as Described
+from kappaskin.cli.common import DescribedFingers as DescribedFingers
 from kappaskin.cli.common import Limit as Limit
 from kappaskin.cli.common import ProgressLine as ProgressLine
-from kappaskin.cli.common import SourceName as SourceName
+from kappaskin.cli.common import Sources as Sources
 from kappaskin.cli.common import Switch as Switch
 from kappaskin.cli.common import allow as allow
 from kappaskin.cli.common import check_output as check_output
-from kappaskin.cli.common import of_sensor as of_sensor
+from kappaskin.cli.common import fingers_of as fingers_of
 from kappaskin.cli.common import show
 from kappaskin.errors import Refusal
 

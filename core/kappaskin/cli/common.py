@@ -60,6 +60,29 @@ def _source(_: type, tokens: Sequence[Token]) -> str:
 SourceName = Annotated[str, Parameter(allow_leading_hyphen=True, converter=_source)]
 """The name of a source; - is standard input, and no option."""
 
+Sources = Annotated[
+    list[str] | None,
+    Parameter(
+        name="--source",
+        negative="",
+        allow_leading_hyphen=True,
+        help="The source of one finger of a hand, as NAME=SOURCE; may be given several times.",
+    ),
+]
+"""An option for `fingers_of`."""
+
+DescribedFingers = Annotated[
+    list[str] | None,
+    Parameter(
+        name="--sensor",
+        negative="",
+        help="TOML file that describes a sensor with a line format of its own; the source may then "
+        "also be udp://:PORT, - for standard input, or a file to play. Of one finger alone as "
+        "NAME=FILE; may be given several times.",
+    ),
+]
+"""An option for `fingers_of`."""
+
 _UNITS = {"kB": 1e3, "MB": 1e6, "GB": 1e9, "TB": 1e12}
 
 
@@ -112,6 +135,65 @@ def of_sensor(source: str, sensor: Path | None) -> str:
     described = described_source(sensor, source)
     load_description(sensor)  # or refused here
     return described
+
+
+def fingers_of(
+    source: str | None, sources: list[str] | None, sensors: list[str] | None
+) -> dict[str, str]:
+    """The source of each finger by its name, empty where there is one without, and no other.
+
+    Each has the description of its own in `sensors`, or the one without a name.
+    """
+    from kappaskin.recording import Recording, ReplayedSource
+    from kappaskin.sources import named_sources
+
+    if (source is None) == (not sources):
+        raise Refusal(
+            "expected a source such as sim:, or --source NAME=SOURCE for each finger of a hand; "
+            f"got {'none' if source is None else 'both'}"
+        )
+    named = named_sources(sources or [source or ""])
+    only = named.get("", "")
+    if only.startswith(ReplayedSource.SCHEME) and Path(only.partition(":")[2]).exists():
+        with Recording(Path(only.partition(":")[2])) as recording:
+            if len(recording.fingers) > 1:
+                named = {finger: f"{only}#{finger}" for finger in recording.fingers}
+    files = dict[str, Path]()
+    for text in sensors or ():
+        finger, found, file = text.partition("=")
+        finger, file = (finger, file) if found and finger in named else ("", text)
+        files[finger] = Path(file)
+    return {
+        finger: of_sensor(each, files.get(finger, files.get(""))) for finger, each in named.items()
+    }
+
+
+class FingerMonitor:
+    """Follows a finger of a hand: uses its saved tare, and prints what happens to it, each once.
+
+    Called now and then, it returns the status; `slope` is the largest that was neglected though it
+    matters.
+    """
+
+    def __init__(self, finger: str, engine: "Engine") -> None:
+        self._finger, self._engine = finger, engine
+        self.tared, self.slope = UsedTare(engine), 0.0
+        self._printed = set[str]()
+
+    def __call__(self) -> "Status":
+        from kappaskin.live import LOST
+
+        status = self._engine.status()
+        self.tared(status)
+        self.slope = max(self.slope, status.slope)
+        notices = [event.text for event in status.events if event.kind in ("noise", "engine")]
+        if status.state == LOST or self._engine.silent:
+            notices.append(status.message)
+        for text in filter(None, (*notices, status.refusal)):
+            if text not in self._printed:
+                self._printed.add(text)
+                show(f"kappaskin: {self._finger}: {text}", error=True)
+        return status
 
 
 class UsedTare:

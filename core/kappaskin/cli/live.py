@@ -3,19 +3,21 @@
 import math
 import time
 from contextlib import closing
+from itertools import combinations
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from kappaskin.cli.common import (
     FAILED,
-    Described,
+    DescribedFingers,
     SourceName,
+    Sources,
     Switch,
     UsedTare,
     Whole,
     check_time,
-    of_sensor,
+    fingers_of,
     print_json,
     show,
     stops,
@@ -23,7 +25,7 @@ from kappaskin.cli.common import (
 from kappaskin.errors import Refusal
 
 if TYPE_CHECKING:
-    from kappaskin.live import Engine, Status
+    from kappaskin.live import Engine, Fingers, Status
     from kappaskin.publish import TargetStatus
 
 _EVERY = 1.0  # s between two lines
@@ -36,13 +38,15 @@ Perhaps = Annotated[list[str] | None, Parameter(negative="", consume_multiple=Tr
 
 
 def publish(
-    source: SourceName,
+    source: SourceName | None = None,
+    /,
     *,
+    sources: Sources = None,
     udp: Many = None,
     foxglove: Perhaps = None,
     allow_origin: Many = None,
     seconds: float = math.inf,
-    sensor: Described = None,
+    sensor: DescribedFingers = None,
     trust: Switch = False,
 ) -> int:
     """Publish contact, shape and error bars of every estimate, until stopped (Ctrl+C).
@@ -53,7 +57,13 @@ def publish(
     until it was sent. The messages are explained in `publishing/messages.md` among the resources.
     Exit code 1 if there was nothing to send, or if the connection was lost in the end.
 
+    Of a hand each finger has a source, a sensor and a tare of its own. Messages and topics name the
+    finger; one that is lost, stalls or dies leaves the others alone. Of a recording of a hand all
+    fingers are published.
+
     Example: `kappaskin publish /dev/ttyACM0 --udp 192.168.1.20:9870 --foxglove`
+
+    Example: `kappaskin publish --source thumb=/dev/ttyACM0 --source index=/dev/ttyACM1 --udp :9870`
 
     Parameters
     ----------
@@ -62,7 +72,8 @@ def publish(
     udp
         HOST:PORT to send JSON datagrams to; may be given several times.
     foxglove
-        Serve Foxglove at HOST:PORT, or without one at 127.0.0.1:8765; give it after the source. At
+        Serve Foxglove at HOST:PORT, or without one at 127.0.0.1:8765; give it after the source. Of
+        a hand each finger has a server of its own, at ports that follow each other. At
         an address that other machines reach, such as 0.0.0.0, it asks for a token: the URL with it
         is printed, and KAPPASKIN_TOKEN in the environment sets it.
     allow_origin
@@ -74,14 +85,14 @@ def publish(
     trust
         Let the scene name files outside its folder.
     """
-    from kappaskin.live import LOST, Engine
+    from kappaskin.live import LOST, Fingers
     from kappaskin.pipeline import Setup
     from kappaskin.publish import targets_of
     from kappaskin.scenes import load_scene
     from kappaskin.sources import SimulatedSource
 
     check_time(seconds, "publish")
-    source = of_sensor(source, sensor)
+    fingers = fingers_of(source, sources, sensor)
     places = foxglove if foxglove != [] else [""]
     targets = [f"udp://{place}" for place in udp or ()]
     targets += [f"foxglove://{place}" for place in places or ()]
@@ -90,59 +101,96 @@ def publish(
     if allow_origin and not places:
         raise Refusal("--allow-origin is for pages that connect to a server: give --foxglove")
     targets_of(targets)  # or refused here
-    if source.startswith(SimulatedSource.SCHEME):
-        load_scene(source.removeprefix(SimulatedSource.SCHEME), trust)  # or refused here
+    for source in fingers.values():
+        if source.startswith(SimulatedSource.SCHEME):
+            load_scene(source.removeprefix(SimulatedSource.SCHEME), trust)  # or refused here
     stopped = stops()
-    with Engine(Setup(quantities=())) as engine:
-        engine.publish(targets, allow_origin or ())
-        engine.connect(source, trust)
-        status = _watched(engine, time.monotonic() + seconds, stopped)
-    if status.state == LOST and not status.ended:
-        show(f"kappaskin: {status.message}", error=True)
-        return FAILED
-    return FAILED if math.isnan(status.publishing.latency.whole) else 0
+    with Fingers(fingers, Setup(quantities=())) as hand:
+        hand.publish(targets, allow_origin or ())
+        hand.connect(fingers, trust)
+        statuses = _watched(hand, time.monotonic() + seconds, stopped)
+    failed = False
+    for finger, status in statuses.items():
+        lost = status.state == LOST and not status.ended
+        if lost and len(fingers) == 1:
+            show(f"kappaskin: {_named(finger, status.message)}", error=True)
+        failed |= lost or math.isnan(status.publishing.latency.whole)
+    return FAILED if failed else 0
 
 
-def _watched(engine: "Engine", end: float, stopped: list[int]) -> "Status":
-    """Print a line a second until the `end`; the last status."""
-    from kappaskin.estimation import slope_warning
+def _named(finger: str, text: str) -> str:
+    return f"{finger}: {text}" if finger else text
 
-    printed, line, slope = time.monotonic(), "", 0.0
-    noticed, tared = set[str](), UsedTare(engine)
-    status = engine.status()
-    while not (stopped or status.ended) and time.monotonic() < end:
-        time.sleep(_POLL)
-        engine.revive()
-        status = engine.status()
-        if engine.given_up or engine.silent > _PATIENCE:
+
+class _Watch:
+    """Follows a finger: uses its saved tare, and prints what it says, each thing once."""
+
+    def __init__(self, finger: str, engine: "Engine", alone: bool) -> None:
+        self._finger, self._engine, self._alone = finger, engine, alone
+        self._slope, self._noticed, self._tared = 0.0, set[str](), UsedTare(engine)
+        self.status, self.given_up = engine.status(), False
+
+    def __call__(self) -> None:
+        """Read the status; a `Refusal` where there is nothing to wait for."""
+        from kappaskin.estimation import slope_warning
+        from kappaskin.live import LOST
+
+        self._engine.revive()
+        self.status = status = self._engine.status()
+        self.given_up = self._engine.given_up or self._engine.silent > _PATIENCE
+        if self.given_up and self._alone:
             raise Refusal(status.message)
-        tared(status)
+        self._tared(status)
         for target in status.publishing.targets:
             if target.refusal:
                 raise Refusal(target.refusal)
         notices = [
-            (one.target, notice) for one in status.publishing.targets for notice in one.notices
+            f"{one.target}: {notice}" for one in status.publishing.targets for notice in one.notices
         ]
-        notices += [("noise", event.text) for event in status.events if event.kind == "noise"]
-        _print_notices(notices, noticed)
-        if status.slope > _STEEPER * slope:
-            slope = status.slope
-            show(f"kappaskin: {slope_warning(slope)}", error=True)
+        notices += [f"noise: {event.text}" for event in status.events if event.kind == "noise"]
+        if not self._alone and status.state == LOST:
+            notices.append(status.message)
+        if status.slope > _STEEPER * self._slope:
+            self._slope = status.slope
+            notices.append(slope_warning(self._slope))
+        for text in notices:
+            if text not in self._noticed:
+                self._noticed.add(text)
+                show(f"kappaskin: {_named(self._finger, text)}", error=True)
+
+    @property
+    def line(self) -> str:
+        return _named(self._finger, _line(self.status))
+
+
+def _watched(hand: "Fingers", end: float, stopped: list[int]) -> "dict[str, Status]":
+    """Print a line a second of each finger until the `end`; the last statuses."""
+    printed, lines, alone = time.monotonic(), list[str](), len(hand.engines) == 1
+    watches = {finger: _Watch(finger, each, alone) for finger, each in hand.engines.items()}
+    each = watches.values()
+    while not (stopped or all(one.status.ended for one in each)) and time.monotonic() < end:
+        time.sleep(_POLL)
+        for one in each:
+            one()
+        if all(one.given_up for one in each):
+            raise Refusal("; ".join(one.status.message for one in each))
         if time.monotonic() - printed >= _EVERY:
-            printed, line = time.monotonic(), _line(status)
-            show(line)
-    if (last := _line(status)) != line:
-        show(last)
-    return status
+            printed, lines = time.monotonic(), [one.line for one in each]
+            show(*lines, *_apart(hand))
+    if (last := [one.line for one in each]) != lines:
+        show(*last)
+    return {finger: one.status for finger, one in watches.items()}
 
 
-def _print_notices(notices: list[tuple[str, str]], printed: set[str]) -> None:
-    """Print (name, text) of each notice on standard error, unless it is already in `printed`."""
-    for name, notice in notices:
-        text = f"kappaskin: {name}: {notice}"
-        if text not in printed:
-            printed.add(text)
-            show(text, error=True)
+def _apart(hand: "Fingers") -> list[str]:
+    """How far apart in time fingers can be compared, as a line; none of one finger."""
+    found = hand.aligned(hand.status()) if len(hand.engines) > 1 else {}
+    if len(found) < 2:
+        return []
+    taken = [estimate.taken for estimate in found.values()]
+    sd = max(math.hypot(a.taken_sd, b.taken_sd) for a, b in combinations(found.values(), 2))
+    apart = f"{1e3 * (max(taken) - min(taken)):.1f} \N{PLUS-MINUS SIGN} {1e3 * sd:.2f} ms apart"
+    return [f"{len(found)} fingers on one clock: nearest scans {apart}"]
 
 
 def _line(status: "Status") -> str:

@@ -10,18 +10,20 @@ from cyclopts import Parameter
 
 from kappaskin.cli.common import (
     FAILED,
-    Described,
+    DescribedFingers,
+    FingerMonitor,
     Limit,
     Pair,
     ProgressLine,
     SourceName,
+    Sources,
     Switch,
     UsedTare,
     allow,
     check_output,
     check_time,
+    fingers_of,
     lined,
-    of_sensor,
     pair,
     print_result,
     result_of,
@@ -32,7 +34,7 @@ from kappaskin.cli.common import (
 from kappaskin.errors import Refusal
 
 if TYPE_CHECKING:
-    from kappaskin.live import Engine, Status
+    from kappaskin.live import Engine, Fingers, Status
     from kappaskin.recording import Recording
 
 _POLL = 0.05  # s
@@ -41,14 +43,16 @@ _OPENED = 120.0  # s within which a source is open: a large mesh is prepared for
 
 
 def record(
-    source: SourceName,
-    out: Path,
+    source: SourceName | None = None,
+    /,
+    out: Path | None = None,
     *,
+    sources: Sources = None,
     seconds: float = math.inf,
-    sensor: Described = None,
+    sensor: DescribedFingers = None,
     trust: Switch = False,
 ) -> int:
-    """Record a source to a file, until stopped (Ctrl+C).
+    """Record a source, or several at once, to a file, until stopped (Ctrl+C).
 
     Records every byte received and every estimate computed from it, to an MCAP file that Foxglove,
     PlotJuggler and the tools of ROS 2 open. It is called OUT.part until it is complete;
@@ -56,7 +60,12 @@ def record(
     full disk, if no readings arrived, or if the connection was lost in the end. A source that
     ends, as a file does, ends the recording.
 
+    Of a hand each finger has a source, a sensor and a tare of its own, and all are in one file. One
+    that is lost, stalls or dies is reported and leaves the others alone; the exit code is 1 then.
+
     Example: `kappaskin record sim: press.mcap --seconds 10`
+
+    Example: `kappaskin record hand.mcap --source thumb=/dev/ttyACM0 --source index=/dev/ttyACM1`
 
     Parameters
     ----------
@@ -75,10 +84,18 @@ def record(
     from kappaskin.recording import ReplayedSource
 
     check_time(seconds, "record")
-    source = of_sensor(source, sensor)
-    if source.startswith(ReplayedSource.SCHEME):
-        raise Refusal(f"expected a live source to record, got {source}; copy its file")
+    if sources and out is None and source is not None:  # the one by place is the file then
+        source, out = None, Path(source)
+    if out is None:
+        raise Refusal("expected a file to record to, such as press.mcap, got none; give it")
+    fingers = fingers_of(source, sources, sensor)
+    for source in fingers.values():
+        if source.startswith(ReplayedSource.SCHEME):
+            raise Refusal(f"expected a live source to record, got {source}; copy its file")
     stopped = stops()
+    if "" not in fingers:
+        return _record_hand(fingers, out, seconds, trust, stopped)
+    source = fingers[""]
     with Engine(Setup(quantities=())) as engine:
         # Before there is a source, so that nothing of it is missed.
         engine.record(out)
@@ -111,6 +128,70 @@ def record(
         show(f"kappaskin: {why}", error=True)
     failed = written.trouble or status.refusal or gone or written.lost
     return FAILED if failed or not status.accounting.accepted else 0
+
+
+def _record_hand(
+    sources: dict[str, str], out: Path, seconds: float, trust: bool, stopped: list[int]
+) -> int:
+    """Record all fingers of a hand; the exit code."""
+    from kappaskin.estimation import slope_warning
+    from kappaskin.live import LOST, Fingers
+    from kappaskin.pipeline import Setup
+
+    with Fingers(sources, Setup(quantities=())) as hand:
+        hand.record(out)
+        hand.connect(sources, trust)
+        monitors = {finger: FingerMonitor(finger, each) for finger, each in hand.engines.items()}
+        with ProgressLine() as show_progress:
+            statuses = _hand_recorded(hand, monitors, seconds, stopped, show_progress)
+        written = hand.end_recording()
+        began = any(status.accounting.accepted for status in statuses.values())
+    if not began and not written.trouble:
+        out.unlink(missing_ok=True)  # ours, with nothing in it
+    size = f"{written.messages:,} messages in {written.seconds:.1f} s, {written.size / 1e6:.1f} MB"
+    show(f"{written.path}: {size}" if began else f"{out}: nothing was recorded")
+    failed = not began
+    for finger, status in statuses.items():
+        show(f"  {finger}: {status.accounting.words}")
+        lost = status.recording.lost
+        if lost:
+            show(f"  {finger}: {lost:,} messages were not recorded: the disk is too slow")
+        if monitors[finger].slope:
+            _warn(f"{finger}: {slope_warning(monitors[finger].slope)}")
+        gone = status.state == LOST and not status.ended
+        gone |= any(event.kind == "engine" for event in status.events)  # and was started again
+        failed |= bool(lost or gone or status.refusal or not status.accounting.accepted)
+    if written.trouble:
+        _warn(written.trouble)
+    return FAILED if failed or written.trouble else 0
+
+
+def _hand_recorded(
+    hand: "Fingers",
+    monitors: dict[str, FingerMonitor],
+    seconds: float,
+    stopped: list[int],
+    show_progress: ProgressLine,
+) -> "dict[str, Status]":
+    """Record until it is over: stopped, all sources ended, or none comes; the last statuses."""
+    from kappaskin.live import LOST
+
+    began = recording = time.monotonic()
+    while True:
+        hand.revive()
+        statuses = {finger: monitor() for finger, monitor in monitors.items()}
+        now, written = time.monotonic(), hand.recording
+        if all(status.slot is None for status in statuses.values()) and now - began <= _BEGIN:
+            recording = now
+        lost = all(status.state == LOST for status in statuses.values()) or now - began > _OPENED
+        none = lost and not any(monitor.tared.connections for monitor in monitors.values())
+        over = none or all(status.ended for status in statuses.values())
+        if stopped or written.trouble or over or now - recording >= seconds:
+            return statuses
+        rates = (f"{finger} {status.rate:.0f}" for finger, status in statuses.items())
+        size = f"{written.seconds:7.1f} s  {written.size / 1e6:8.1f} MB"
+        show_progress(f"{size}  frames/s: {', '.join(rates)}")
+        time.sleep(_POLL)
 
 
 def _warn(text: str) -> None:
@@ -207,12 +288,29 @@ def info(file: Path, *, json: Switch = False, limit: Limit = "") -> None:
     from kappaskin.recording import Recording
 
     allow(limit)
+    hand = dict[str, dict[str, Any]]()
+    for finger in _fingers(file):
+        with Recording(file, finger) as recording:
+            hand[finger] = _contents(recording)
+    contents = hand.get("", {"fingers": hand})
+    texts = [_contents_text(_of(file, finger), each) for finger, each in hand.items()]
+    print_result(contents, json, lambda: "\n".join(texts))
+
+
+def _fingers(file: Path) -> tuple[str, ...]:
+    """The fingers in a recording; an empty name where it has one without a name."""
+    from kappaskin.recording import Recording
+
     with Recording(file) as recording:
-        contents = _contents(recording)
-    print_result(contents, json, lambda: _contents_text(file, contents))
+        return recording.fingers
 
 
-def _contents_text(file: Path, contents: dict[str, Any]) -> str:
+def _of(file: Path, finger: str) -> str:
+    """The file, and the finger in it."""
+    return f"{file} ({finger})" if finger else str(file)
+
+
+def _contents_text(file: str, contents: dict[str, Any]) -> str:
     whole = "" if contents["whole"] else " (unfinished: see `kappaskin repair`)"
     seconds, began = contents["seconds"], contents["began"]
     by = f"{contents['library']}, revision {contents['revision'] or 'unknown'}"
@@ -271,10 +369,14 @@ def verify(file: Path, *, limit: Limit = "") -> int:
     from kappaskin.recording import Verification
 
     allow(limit)
-    with BackgroundProcess[float | Verification]("verify", Verification.steps, file) as work:
-        verdict = result_of(work.wait(), Verification)
-    show(f"{file}: {verdict.words}", *(f"  {line}" for line in verdict.changed))
-    return 0 if verdict.passed else FAILED
+    passed = True
+    for finger in _fingers(file):
+        about = "verify", Verification.steps, file, finger
+        with BackgroundProcess[float | Verification](*about) as work:
+            verdict = result_of(work.wait(), Verification)
+        show(f"{_of(file, finger)}: {verdict.words}", *(f"  {line}" for line in verdict.changed))
+        passed = passed and verdict.passed
+    return 0 if passed else FAILED
 
 
 _NOTHING = 3
@@ -317,15 +419,18 @@ def export(
     until: float = math.inf,
     every: float = 0.0,
     at: float | None = None,
+    finger: str | None = None,
     limit: Limit = "",
-) -> None:
+) -> int:
     """Export a recording: contact, readings or everything as a table, or the surface as a mesh.
 
     The suffix selects the format. A .parquet, .csv, .npz or .h5 has a row for each frame,
     recomputed from the recorded bytes with the recorded settings; the preset selects its columns.
     A .vtp or .stl is the skin in space at one moment, a .pvd a series of .vtp files. A .glb (glTF)
     is the skin at one moment, as it moves with the time between two shapes, or at its deepest.
-    Every file states units, settings, calibration, tare and device.
+    Every file states units, settings, calibration, tare and device. Of a hand each finger has a
+    file of its own, named as TO and the finger: press-thumb.csv; exit code 1 if there is none of
+    one of them.
 
     Example: `kappaskin export press.mcap --to press.csv --from 2 --until 4`
 
@@ -347,19 +452,35 @@ def export(
         Seconds between two rows or surfaces; every frame when left out.
     at
         The time of a single surface, in seconds since the recording began.
+    finger
+        The one finger of a hand to export, to the file TO.
     """
     from kappaskin.recording import Exported, ExportRequest, ExportTask
 
     allow(limit)
-    try:
-        with ExportTask(
-            ExportRequest(recording, to, begin, until, every, at, preset=preset)
-        ) as exporting:
-            done = result_of(exporting.wait(), Exported)
-    except KeyboardInterrupt:
-        raise Refusal("stopped before the end; nothing was written") from None
-    show(*exporting.files)
-    show(done.words, error=True)
+    fingers = _fingers(recording) if finger is None else (finger,)
+    several = len(fingers) > 1
+    each = [(name, to.with_stem(f"{to.stem}-{name}") if several else to) for name in fingers]
+    requests = [  # all of them first: one may be refused
+        ExportRequest(recording, out, begin, until, every, at, preset=preset, finger=name)
+        for name, out in each
+    ]
+    code = 0
+    for request in requests:
+        try:
+            with ExportTask(request) as exporting:
+                done = result_of(exporting.wait(), Exported)
+        except KeyboardInterrupt:
+            raise Refusal(f"stopped before the end; {request.to} was not written") from None
+        except Refusal as refusal:
+            if not several:
+                raise
+            _warn(f"{request.finger}: {refusal}")
+            code = FAILED
+            continue
+        show(*exporting.files)
+        show(done.words, error=True)
+    return code
 
 
 def import_(

@@ -262,16 +262,17 @@ def design(
 
     The errors of the place and force of the scene's load, pressed all over the skin, and of the
     shape, due to noise alone and without a simulation. As many elements as the scene has are
-    placed as in the scene, D- or A-optimally for the shape, or clustered.
+    placed as in the scene, for the least errors of contacts, D- or A-optimally for the shape, or
+    clustered.
 
-    Example: `kappaskin design finger.scene.toml --place scene A --out felt.ply`
+    Example: `kappaskin design finger.scene.toml --place scene contact --out felt.ply`
 
     Parameters
     ----------
     scene
         The name of a ready scene, or a file that ends in .toml; the default one when left out.
     place
-        The placements to compare, of scene, clustered, D and A.
+        The placements to compare, of scene, contact, clustered, D and A.
     basis
         Number of functions along x and y of the shape; on a mesh their product counts.
     out

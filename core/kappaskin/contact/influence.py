@@ -13,12 +13,13 @@ import scipy
 from numpy.typing import NDArray
 
 from kappaskin._files import cached
+from kappaskin._processes import progress
 from kappaskin.bases import Basis, CapBasis, MeshBasis, ProductBasis, SineBasis, basis_for
 from kappaskin.errors import Refusal
-from kappaskin.frames import Array
+from kappaskin.frames import Array, Indices
 from kappaskin.mechanics import CapWaves, Compliance, Plate, Shell, cap_shell
 from kappaskin.sensing import SensorLayout
-from kappaskin.skin import Cap, MeshSkin, Patch
+from kappaskin.skin import Base, Cap, MeshSkin, Patch
 
 Single = NDArray[np.float32]
 
@@ -73,7 +74,8 @@ def influence_of(
     _check_decay(plate, functions)
     if not isinstance(plate.patch, Cap | MeshSkin) and not (is_rectangle and _is_stiff(plate)):
         return _OfFunctions(plate, layout, edge, functions, out)
-    if not layout.senses_curvature_only or (layout.reads and layout.gage_length):
+    is_mesh = isinstance(plate.patch, MeshSkin)
+    if not layout.senses_curvature_only or (layout.reads and layout.gage_length and not is_mesh):
         return _OfFunctions(plate, layout, edge, _FINE, out)
     if layout.reads or layout.scale is not None:
         return _OfDirections(plate, layout, edge, out)
@@ -87,14 +89,34 @@ def _of_curvature(plate: Plate) -> Callable[[Plate, SensorLayout, str, Array], I
     return _OfMesh if isinstance(plate.patch, MeshSkin) else _OfPlate
 
 
+_START, _LEAST, _LARGEST = 0.03, 1e-3, 0.2  # of the shorter side: radius of a load
+
+
+def sizes_on(patch: Patch) -> tuple[float, float, float]:
+    """Squared radii in m^2 of a load: one to begin with, the least and the largest fitted."""
+    side = patch.a if patch.strip else min(patch.a, patch.b)
+    largest = _WIDEST if isinstance(patch, MeshSkin) else _LARGEST
+    return (_START * side) ** 2, (_LEAST * side) ** 2, (largest * side) ** 2
+
+
 @lru_cache(1)  # the same array for all, which is read in half the time
 def read_of_modes(
     plate: Plate, layout: SensorLayout, edge: str, functions: int
 ) -> tuple[Basis, Compliance, Array]:
-    """So many functions each way, and what the channels read of a unit force on each, (C, N)."""
-    basis = basis_for(plate.patch, edge, functions, 1 if plate.patch.strip else functions)
+    """So many functions each way, and what the channels read of a unit force on each, (C, N).
+
+    Fewer on a mesh that has not the nodes for them.
+    """
+    basis = _basis_of(plate, edge, functions)
     compliance = plate.compliance(basis)
     return basis, compliance, compliance.after(layout.operator(basis, plate))
+
+
+def _basis_of(plate: Plate, edge: str, functions: int) -> Basis:
+    patch = plate.patch
+    if isinstance(patch, MeshSkin):
+        functions = min(functions, math.isqrt(patch.most_functions))
+    return basis_for(patch, edge, functions, 1 if patch.strip else functions)
 
 
 _FINE = 32  # functions each way that heights and slopes are followed by
@@ -267,6 +289,8 @@ class _DiscOnGages:
 
 _NEAREST = 1e-6  # of a standard deviation: nearer, a Gaussian load bends the plate no more
 _FAR = 40.0  # exp1 of it is less than the rounding of what it is added to
+_TAIL = 6.0  # times the squared radius: so far off, a Gaussian as wide has exp(-12) left
+_PER_TAIL = 6000  # steps of its table, which is exact to 1e-4 of a load's middle
 
 
 def _gaussian(d: Array, sd: float) -> tuple[Array, Array]:
@@ -281,10 +305,19 @@ def _gaussian(d: Array, sd: float) -> tuple[Array, Array]:
 
 def _sharper(d: Array, s: float) -> tuple[Array, Array]:
     """What A and B of a Gaussian load differ by from those of a disc as wide, of s = r^2."""
-    A, B = _gaussian(d, math.sqrt(s) / 2)
-    t: Array = d[0] ** 2 + d[1] ** 2
-    m = np.maximum(t, s)
-    return A - np.log(m) - (s + t) / (2 * m), B - (2 - s / m) / m
+    t = d[0] ** 2 + d[1] ** 2
+    t *= _PER_TAIL / (_TAIL * s)
+    A, B = (each.take(t.astype(np.intp), mode="clip") for each in _sharper_table())
+    return A, B / s
+
+
+@lru_cache(1)
+def _sharper_table() -> Array:
+    """`_sharper` of s = 1 (2, t) by the squared distance t; farther off both loads are alike."""
+    t = _TAIL * (np.arange(_PER_TAIL) + 0.5) / _PER_TAIL
+    A, B = _gaussian(np.stack([np.sqrt(t), np.zeros_like(t)]), 0.5)
+    m = np.maximum(t, 1.0)
+    return np.stack([A - np.log(m) - (1 + t) / (2 * m), B - (2 - 1 / m) / m])
 
 
 def _under_gaussian(d: Array, sd: float, gage_length: float) -> Array:
@@ -295,8 +328,8 @@ def _under_gaussian(d: Array, sd: float, gage_length: float) -> Array:
 def _read(load: Callable[[Array], tuple[Array, Array]], d: Array, gage_length: float) -> Array:
     """Curvature (3, ...) read at `d` (2, ...) of a load's A and B there."""
     if not gage_length:
-        A, B = load(d)
-        return np.stack([A + B * d[0] ** 2, A + B * d[1] ** 2, B * d[0] * d[1]])
+        (x, y), (A, B) = d, load(d)
+        return np.array([A + B * x * x, A + B * y * y, B * x * y])
 
     def slope(x: float, y: float, along: float) -> Array:
         D = d + (along * np.array([x, y])).reshape(2, *[1] * (d.ndim - 1))
@@ -416,20 +449,14 @@ class _OfDirections:
     sized = True
 
     def __init__(self, plate: Plate, layout: SensorLayout, edge: str, out: Array) -> None:
-        self._rows, self._out = np.zeros((4, 3 * len(layout))), out
-        self._of = _of_curvature(plate)(plate, layout.of_curvature, edge, self._rows)
+        each, self._of_each, self._channels, self._parts = _read_along(layout)
+        self._rows, self._out = np.zeros((4, 3 * len(each))), out
+        self._of = _of_curvature(plate)(plate, each, edge, self._rows)
         self.unit = self._of.unit
         self.nodes: tuple[Array, Single] | None = None
-        reads, P = layout.reads, len(layout)
-        self._parts = np.repeat(np.eye(3), P, axis=1)
-        if reads is not None:
-            c, s = reads.along.T
-            twist = reads.quantity == "twist"
-            self._parts = np.where(twist, 0.0, [c * c, s * s, 2 * c * s])
-            self._parts[2, twist] = 1.0
         if layout.scale is not None:
             self._parts *= layout.scale
-        self._channels = layout.element + P * np.arange(3)[:, None]
+        self._trust = np.ones(len(layout))
         if self._of.nodes is not None:
             places, read = self._of.nodes
             parts = self._parts.astype(np.float32)
@@ -441,7 +468,11 @@ class _OfDirections:
         np.einsum("cr,ncr->nr", self._parts, self._rows[:, self._channels], out=self._out)
 
     def trust(self, s: float, share: float) -> Array | None:
-        return self._of.trust(s, share)
+        found = self._of.trust(s, share)
+        if found is None or len(found) == len(self._trust):
+            return found
+        self._trust[self._of_each] = found
+        return self._trust
 
     def profile(self, s: float) -> Array | None:
         rows = self._of.profile(s)
@@ -452,6 +483,33 @@ class _OfDirections:
 
     def gives(self, x: float, y: float) -> float:
         return self._of.gives(x, y)
+
+
+def _read_along(layout: SensorLayout) -> tuple[SensorLayout, Indices, Indices, Array]:
+    """Elements that read curvature, which of the layout's they are, and each reading from theirs.
+
+    As the sum of three of their readings (3, C), by parts (3, C).
+    """
+    reads, P = layout.reads, len(layout)
+    channels = layout.element + P * np.arange(3)[:, None]
+    if reads is None:
+        return layout, np.arange(P), channels, np.repeat(np.eye(3), P, axis=1)
+    twist = reads.quantity == "twist"
+    if not layout.gage_length:
+        c, s = reads.along.T
+        parts = np.where(twist, [[0.0], [0.0], [1.0]], [c * c, s * s, 2 * c * s])
+        return layout.of_curvature, np.arange(P), channels, parts
+    # On a mesh. What one gage reads does not follow from what others do: each is taken for an
+    # element of its own, which reads along it; a twist has two of them.
+    both = np.arange(np.count_nonzero(twist))
+    turns = [np.where(twist, np.pi / 4, reads.direction), np.full(len(both), -np.pi / 4)]
+    own = np.concatenate([reads.element, reads.element[twist]])
+    each = SensorLayout.scattered(layout.patch, layout.positions[own])
+    each = each.reading(np.arange(len(own)), "curvature").turned(np.concatenate(turns))
+    channels = np.tile(np.arange(len(twist)), (3, 1))
+    channels[1, twist] = len(twist) + both
+    parts = np.where(twist, [[0.5], [-0.5], [0.0]], [[1.0], [0.0], [0.0]])
+    return replace(each, gage_length=layout.gage_length), own, channels, parts
 
 
 class _OfCap:
@@ -548,25 +606,29 @@ class _OfMesh:
         self._mesh, self._out = cast("MeshSkin", plate.patch), out
         self.unit = 8 * math.pi * plate.rigidity
         self._gage_length = length = layout.gage_length
-        places = layout.positions.tobytes()
+        turns = np.zeros(len(layout)) if layout.turns is None else layout.turns
+        places = np.column_stack([layout.positions, turns]).tobytes()
         table, variances = _rest_on_mesh(plate, edge, places, length)
         self._block = lru_cache(32)(partial(self._mesh.splines.block, table))
         # Lagrange's polynomials through the variances of the table, by powers of the variance,
         # and what a disc's even moments are of those of a Gaussian as wide.
         self._widest, n = float(variances[-1]), len(variances)
         self._shares = np.linalg.inv(np.vander(variances / self._widest, increasing=True))
-        self._powers = np.arange(float(n))
-        self._moments = 2.0**self._powers / scipy.special.factorial(self._powers + 1)
-        self._basis, self._compliance, _ = read_of_modes(plate, layout.of_curvature, edge, _ON_MESH)
+        self._powers = k = np.arange(float(n))
+        of_disc = 2.0**k / scipy.special.factorial(k + 1)
+        self._moments = np.stack([of_disc, 1 - of_disc, k * of_disc, k * (1 - of_disc)])
+        self._basis = _basis_of(plate, edge, _ON_MESH)
+        self._compliance = plate.compliance(self._basis)
         N, area = self._basis.size, float(self._mesh.areas.sum())
         self._finer = area / (16 * math.pi**2 * plate.rigidity * N)
         base = self._mesh.base(*layout.positions.T)
-        tangents: Array = np.swapaxes(base.frame, 0, 1)
+        tangents = _tangents(base, turns)
         self._origin = np.vecdot(tangents, np.stack(base.point, axis=-1))
-        self._frame: Array = np.ascontiguousarray(tangents).reshape(-1, 3)
+        self._tangents: Array = np.ascontiguousarray(tangents.reshape(-1, 3).T)
+        self._along = np.empty(self._tangents.shape)
         at = layout.positions
         self._disc = _DiscOnGages(at, length, out) if length else _Disc(at, out)
-        self._difference, self._rest = np.zeros(out.shape), np.zeros((3, n, out.shape[1]))
+        self._difference, self._smooth = np.zeros(out.shape), np.zeros((3, 4, out.shape[1]))
         self.nodes: tuple[Array, Single] | None = self._searched()
 
     def _searched(self) -> tuple[Array, Single]:
@@ -589,33 +651,36 @@ class _OfMesh:
         mesh, disc, out = self._mesh, self._disc, self._out
         r = mesh.jet(x, y)
         # The load from each element along its tangents, and how that moves with x and y.
-        along = (self._frame @ r[:3].T).reshape(2, -1, 3)
-        np.subtract(along[..., 0], self._origin, disc.d)
+        np.dot(r[:3], self._tangents, self._along)
+        at, by_x, by_y = self._along.reshape(3, 2, -1)
+        np.subtract(at, self._origin, disc.d)
         disc.under(s)
-        by_d = out[1:3].reshape(2, 3, -1)
-        by_x, by_y = along[..., 1], along[..., 2]
-        of_x, of_y = by_d[0] * by_x[0], by_d[0] * by_y[0]
-        of_x += by_d[1] * by_x[1]
-        of_y += by_d[1] * by_y[1]
-        by_d[0], by_d[1] = of_x, of_y
+        by_d, work = out[1:3].reshape(2, 3, -1), self._difference.reshape(4, 3, -1)
+        np.multiply(by_d, by_x[:, None], work[:2])
+        np.multiply(by_d, by_y[:, None], work[2:])
+        np.add(work[0], work[1], by_d[0])
+        np.add(work[2], work[3], by_d[1])
         first, weights = mesh.splines.at(x, y)
-        self._rest = weights[:3].dot(self._block(*first)).reshape(self._rest.shape)
-        out += self._smooth(s, self._moments)
-
-    def _smooth(self, s: float, moments: Array) -> Array:
-        """What is smooth (4, C) of a load of these `moments`, each over that of a Gaussian."""
-        k, found = self._powers, self._difference
-        of_size = moments * (s / 4 / self._widest) ** k
-        np.dot(of_size @ self._shares, self._rest, found[:3])
-        np.dot((k / s * of_size) @ self._shares, self._rest[0], found[3])
-        return found
+        rest = weights[:3].dot(self._block(*first))
+        # What is smooth, of the place and by x and y: of a disc, and how a Gaussian load differs.
+        sizes = (s / 4 / self._widest) ** self._powers * self._moments
+        sizes[2:] /= s
+        shares = sizes.dot(self._shares)
+        np.matmul(shares, rest.reshape(3, shares.shape[1], -1), out=self._smooth)
+        out[:3] += self._smooth[:, 0]
+        out[3] += self._smooth[0, 2]
 
     def trust(self, s: float, share: float) -> Array | None:
-        under = np.square(self._out[0]).reshape(3, -1).mean(axis=0)
-        return 1 / (1 + share * (_INEXACT / BY_PROFILE) ** 2 * under)
+        felt = self._out[0].reshape(3, -1)
+        under: Array = np.square(felt).sum(axis=0)
+        inexact = _INEXACT_IN_PART if self._mesh.is_held_in_part else _INEXACT
+        under *= share * (inexact / BY_PROFILE) ** 2 / 3
+        under += 1
+        return np.reciprocal(under, under)
 
     def profile(self, s: float) -> Array | None:
-        found, length = self._smooth(s, 1 - self._moments), self._gage_length
+        found, smooth, length = self._difference, self._smooth, self._gage_length
+        found[:3], found[3] = smooth[:, 1], smooth[0, 3]
         # And right under the load; its slopes there are taken to be those of a disc.
         near = np.flatnonzero(self._disc.t < _TAIL * s + length**2)
         if len(near):
@@ -632,22 +697,23 @@ class _OfMesh:
 
 _ON_MESH = 15  # functions each way, of the displacement under a load
 _INEXACT = 0.01  # of a reading: by elements and theory of shells (`tests/truths/test_meshes.py`)
+_INEXACT_IN_PART = 0.03  # the same, where a part of the rim is free
 _SPREAD = 300  # places searched
-_SEARCHED = {0.02: 1, 0.07: 1, 0.16: 2}  # radii of the shorter side, and at every how many places
+_SEARCHED = {0.02: 1, 0.07: 2, 0.16: 4}  # radii of the shorter side, and at every how many places
 _MESH_SD = 1.2  # steps of the splines: of a Gaussian load
 _CUT = 3.0  # of it: farther away such a load presses no more
 _WIDEST = 0.3  # of the shorter side: a disc as large as the Gaussian loads of the table
-_TAIL = 6.0  # times the squared radius: so far off, a Gaussian as wide has exp(-12) left
 _WIDE = 1.2  # times the decay squared: wider loads are followed by more variances
 _FEW, _MANY = (0.0, 0.4, 1.0), (0.0, 0.08, 0.3, 0.6, 0.85, 1.0)  # of the largest: the variances
 _BLOCK = 16  # elements together: 100 MB
+_READ = 0.5  # of the time that the influence takes: what elements read of forces at nodes
 
 
 @lru_cache(2)
 def _rest_on_mesh(
     plate: Plate, edge: str, places: bytes, gage_length: float
-) -> tuple[Array, Array]:
-    """Splines (G, 3 C) of what is read of Gaussian loads less that on a plate without edges.
+) -> tuple[Single, Array]:
+    """Splines (G, n C) of what is read of n Gaussian loads less that on a plate without edges.
 
     In the units of `_Disc`; and the variances of the loads in m^2.
     """
@@ -658,7 +724,7 @@ def _rest_on_mesh(
         f"discs {mesh.content} {edge} {sizes} {hashlib.sha256(places).hexdigest()}",
         lambda: _made_on_mesh(mesh, edge, of_sheet, places, gage_length, _decay(plate)),
     )
-    return made["splines"].astype(float), made["variances"]
+    return made["splines"], made["variances"]
 
 
 def _made_on_mesh(
@@ -671,18 +737,24 @@ def _made_on_mesh(
 ) -> dict[str, NDArray[Any]]:
     basis = cast("MeshBasis", basis_for(mesh, edge, 1, 1))
     n, unit, functions = len(mesh.points), 8 * math.pi * of_sheet[0], basis.functions
-    layout = SensorLayout.scattered(mesh, np.frombuffer(places).reshape(-1, 2))
-    read = np.empty((n, 3, len(layout)))
-    for i in range(0, len(layout), _BLOCK):
-        part = SensorLayout.scattered(mesh, layout.positions[i : i + _BLOCK])
+    x, y, turns = np.frombuffer(places).reshape(-1, 3).T
+    positions = np.column_stack([x, y])
+    read = np.zeros((n, 3, len(x)))
+    for i in range(0, len(x), _BLOCK):
+        progress.get()(_READ * i / len(x))
+        own = np.s_[i : i + _BLOCK]
+        part = SensorLayout.scattered(mesh, positions[own])
+        if turns.any():
+            part = part.reading(np.arange(len(part)), "curvature").turned(turns[own])
         part = replace(part, gage_length=gage_length)
         rows = part.mean_curvature(basis, functions.nodal_curvature)
         of_forces = functions.read_of_forces(rows, *of_sheet)
-        read[:, :, i : i + _BLOCK] = unit * of_forces.reshape(n, 3, -1)
+        of_forces = of_forces.reshape(n, -1, len(part))
+        read[:, : of_forces.shape[1], own] = unit * of_forces
     sd = _MESH_SD * float(mesh.splines.step.max())
-    spread, base = _spread_by(mesh, sd), mesh.base(*layout.positions.T)
+    spread, base = _spread_by(mesh, sd), mesh.base(x, y)
     away = mesh.points.T[:, :, None] - np.stack(base.point)[:, None]
-    d = np.einsum("pak,knp->anp", base.frame, away)
+    d = np.einsum("apk,knp->anp", _tangents(base, turns), away)
     cut, found = _CUT**2 / 2, list[Array]()
     # Spread again and again, up to the largest load.
     least, largest = sd**2 * (1 - cut / math.expm1(cut)), (_WIDEST * min(mesh.a, mesh.b)) ** 2 / 4
@@ -690,11 +762,18 @@ def _made_on_mesh(
     times = np.unique(np.round(1 + shares * max(largest / least - 1, 2 * len(shares))))
     variances = least * times
     for k in range(1, int(times[-1]) + 1):
+        progress.get()(_READ + (1 - _READ) * (k - 1) / int(times[-1]))
         read = (spread @ read.reshape(n, -1)).reshape(read.shape)
         if k in times:
             plain = _under_gaussian(d, math.sqrt(variances[len(found)]), gage_length)
             found.append(mesh.splines.fit((read - np.moveaxis(plain, 0, 1)).reshape(n, -1)))
     return {"splines": np.hstack(found).astype(np.float32), "variances": variances}
+
+
+def _tangents(base: Base, turns: Array) -> Array:
+    """Unit vectors (2, P, 3) of a base, turned by `turns` (P,) in rad."""
+    (x, y), c, s = np.swapaxes(base.frame, 0, 1), np.cos(turns)[:, None], np.sin(turns)[:, None]
+    return np.stack([c * x + s * y, c * y - s * x])
 
 
 def _spread_by(mesh: MeshSkin, sd: float) -> Any:
@@ -736,14 +815,13 @@ _ON_CAP = 64  # steps of the table of a cap across its box
 _AT_POLE = 1e-3  # of a step: nearer, it is taken for a place so far away
 _RINGS = 2  # steps between the places searched
 _SEARCHED_SIZES = 3, 6, 10  # of the table: radii of 1.5, 4.5 and 8.5 steps
-_SIZES = 0.2  # of the box: the largest radius of a load
 _COARSER = 2  # times the step between sizes, of Gaussian loads, whose readings are smoother
 _TINY = 1e-15  # of the largest of a sum's terms
 
 
 def _radii(steps: int) -> Array:
     """Radii of loads in steps of the table, every so many."""
-    return steps * np.abs(np.arange(math.ceil(_SIZES * _ON_CAP / steps) + 4) - 1.5)
+    return steps * np.abs(np.arange(math.ceil(_LARGEST * _ON_CAP / steps) + 4) - 1.5)
 
 
 @lru_cache(2)
@@ -930,16 +1008,17 @@ def _check_decay(plate: Plate, functions: int) -> None:
     wave of so many functions.
     """
     patch = plate.patch
-    least = max(patch.a, patch.b) / functions / math.pi
+    least, remedy = max(patch.a, patch.b) / functions / math.pi, "check thickness and radii"
     if isinstance(patch, MeshSkin):
         least = _STEPS_OF_DECAY * float(patch.splines.step.max())
+        remedy = "check the thickness, or use smaller triangles"
     elif isinstance(patch, Cap):
         least = _FOLLOWED * cap_half_wave(patch)
     if (decay := _decay(plate)) < least:
         raise Refusal(
             f"expected a skin on which a load is felt over {1e3 * least:.2g} mm at least, got "
             f"{1e3 * decay:.2g} mm on a {patch.name}: it is too thin for its radii to find "
-            "contacts; check thickness and radii"
+            f"contacts; {remedy}"
         )
 
 

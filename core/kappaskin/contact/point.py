@@ -12,12 +12,13 @@ from scipy.linalg import lapack
 
 from kappaskin.bases import Basis, SineBasis, held_near
 from kappaskin.contact.element_grid import modal_projection
-from kappaskin.contact.influence import BY_PROFILE, influence_of, read_of_modes
+from kappaskin.contact.influence import BY_PROFILE, influence_of, read_of_modes, sizes_on
 from kappaskin.contact.stretched import StretchedSkin
 from kappaskin.estimation import Fit, PatternCache
 from kappaskin.frames import Array, Contact, Mask
 from kappaskin.mechanics import Plate
 from kappaskin.sensing import SensorLayout
+from kappaskin.skin import MeshSkin
 
 
 def _squares_on_grid(basis: Basis, G: Array, x: Array, y: Array) -> Array:
@@ -65,10 +66,10 @@ _RIDGE = 1e-12  # keeps a load on the rim, which moves nothing, solvable
 _HARDLY = 1e-9  # of the largest: a direction with no more left is none
 _DOUBTFUL = 0.15  # of a side: within it, a contact may be one on the rim
 _RIM = 1 / 15  # of a side: within it, a load moves the skin too little to be told
-_START, _LEAST, _LARGEST = 0.03, 1e-3, 0.2  # of the shorter side: radius of a load
 _TO_GAUSSIAN = 0.5  # of the way from a disc: the profile of a load, whose standard deviation is as
 _FURTHER = -1.0, 2.0  # much; and how far along that way slopes are followed
 
+_OF_PLACE = 0.06  # of the shorter side: error of a place on a mesh, times that of a force
 _AS_WELL = 1.2  # times the residual of the fitted shape that a single load may leave
 _REGION = 7.81  # variances: drop of chi-squared in the 95 % region of x, y and size
 
@@ -155,10 +156,8 @@ class PointContact:
         self._readings = self._none = np.zeros(len(self._M))
         x, y = self.patch.grid(_SEARCHED + 2, 3 if strip else _SEARCHED + 2)
         self._x, self._y = x[1:-1], y[1:-1]
-        side = self.patch.a if strip else min(self.patch.a, self.patch.b)
-        self._start, self._least, self._largest = (
-            (share * side) ** 2 for share in (_START, _LEAST, _LARGEST)
-        )
+        self._side = self.patch.a if strip else min(self.patch.a, self.patch.b)
+        self._start, self._least, self._largest = sizes_on(self.patch)
         self._nodes = self._influence.nodes
         self._fits_profile = self._nodes is not None
         if self._nodes is None:
@@ -167,6 +166,7 @@ class PointContact:
             self._map = self.basis.on_grid(self._x, self._y)
         else:
             self._places = self._nodes[0]
+            self._searched_T = np.ascontiguousarray(self._nodes[1].T)
         self._still = np.flatnonzero(~self.patch.moves(self._places[:, :2]))
         self._at_node = lru_cache(_NODES)(self._node)
         self._cache = PatternCache[_Tables]()
@@ -191,14 +191,8 @@ class PointContact:
         size is unknown too, on a cap its profile as well. The noise is in the readings' unit, or in
         units of `sigma`. That a skin stretches is left out.
         """
-        tables, s, n = self._used(self._none)[1], max(s, self._least), self._unknowns
-        strength = force / self._influence.unit
-        self._influence.at(x, y, s)
-        profile = self._influence.profile(s)
-        self._rows[5] = 0.0 if profile is None else profile[0]
-        weights = self._weights(s, strength, tables, noise**2)
-        weights = np.ones(len(self._M)) if weights is None else weights
-        rows = self._rows * weights
+        weights, strength = self._look(x, y, s, force, noise)
+        n, rows = self._unknowns, self._rows * weights
         free = rows[6:]
         if len(free):
             rows -= rows @ free.T @ np.linalg.pinv(free @ free.T) @ free
@@ -211,6 +205,32 @@ class PointContact:
         covariance = of_noise @ of_noise.T + np.multiply.outer(of_profile, of_profile) / known
         unit = np.array([self._influence.unit, 1 / strength, 1 / strength])
         return noise**2 * np.multiply.outer(unit, unit) * covariance[:3, :3]
+
+    def information(self, x: float, y: float, s: float, force: float, noise: float) -> Array:
+        """What the readings of each element tell (P, n, n) of such a load: what adds to W.
+
+        The inverse W of the covariance of all that is unknown: the force as a share, x and y in m,
+        the size, what is free, and as the last the profile, which is 0 with a variance of 1.
+        """
+        weights, strength = self._look(x, y, s, force, noise)
+        n, unit = self._unknowns, strength / noise
+        profile = _TO_GAUSSIAN * unit * self._rows[5:6]
+        rows = np.concatenate([unit * self._rows[:n], self._free, profile])
+        told = np.zeros((self._element.max() + 1, *2 * (len(rows),)))
+        np.add.at(told, self._element, np.einsum("ir,jr,r->rij", rows, rows, weights))
+        return told
+
+    def _look(
+        self, x: float, y: float, s: float, force: float, noise: float
+    ) -> tuple[Array, float]:
+        """Write what is read of a load into the rows; weights (R,), and its strength."""
+        tables, s = self._used(self._none)[1], max(s, self._least)
+        strength = force / self._influence.unit
+        self._influence.at(x, y, s)
+        profile = self._influence.profile(s)
+        self._rows[5] = 0.0 if profile is None else profile[0]
+        weights = self._weights(s, strength, tables, noise**2)
+        return np.ones(len(self._M)) if weights is None else weights, strength
 
     def _tables(self, used: Mask) -> _Tables:
         """The tables for the readings `used` (3 P,)."""
@@ -259,7 +279,7 @@ class PointContact:
         """T'K (S,) of the loads searched for."""
         if self._nodes is None:
             return self._map(self._modal(K).reshape(self.basis.shape)).ravel()
-        return self._nodes[1].dot(K.astype(np.float32)).astype(float)
+        return K.astype(np.float32).dot(self._searched_T).astype(float)
 
     def _peak(self, explained: Array, node: int) -> tuple[float, float, float]:
         """x, y and s of the load that explains most: between the points, where they are a grid."""
@@ -316,7 +336,8 @@ class PointContact:
         for _ in range(_STEPS):
             if hopeless := here.left - _HOPE * here.gain > most:
                 break
-            if self._fits_profile and here.left + here.gain > cost + self._worth(x, y) * variance:
+            worse = here.left + here.gain - cost
+            if self._fits_profile and worse > 0 and worse > self._worth(x, y) * variance:
                 x, y, s = (x + there[0]) / 2, (y + there[1]) / 2, (s + there[2]) / 2
             else:
                 there, cost = (x, y, s), here.left + here.gain
@@ -428,12 +449,13 @@ class PointContact:
         sd: list[float] = (spread * np.sqrt(here.inverse.diagonal())).tolist()
         theory = self._theory_error
         of_place = theory if self.patch.is_shallow else 0.0
+        on_mesh = _OF_PLACE * theory * self._side if isinstance(self.patch, MeshSkin) else 0.0
         self.misfit = (spread / float(fit.noise)) ** 2 if fit.noise else math.inf
         under = force * self._influence.gives(x, y)
         if self._stretched is not None:
             under += self._stretched.more(x, y, force)
-        sd_x = math.hypot(sd[1] / strength, of_place * (x - self.patch.a / 2))
-        sd_y = math.hypot(sd[2] / strength, of_place * (y - self.patch.b / 2))
+        sd_x = math.hypot(sd[1] / strength, of_place * (x - self.patch.a / 2), on_mesh)
+        sd_y = math.hypot(sd[2] / strength, of_place * (y - self.patch.b / 2), on_mesh)
         return Contact(
             np.array([x, y]),
             np.array([sd_x, sd_y]),

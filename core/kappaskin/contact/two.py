@@ -10,7 +10,7 @@ import numpy as np
 from kappaskin.bases import held_near
 from kappaskin.contact.drift import FittedDrift, SmoothDrift
 from kappaskin.contact.geometry import contact_geometry
-from kappaskin.contact.influence import BY_PROFILE, influence_of, read_of_modes
+from kappaskin.contact.influence import BY_PROFILE, influence_of, read_of_modes, sizes_on
 from kappaskin.contact.point import NO_CONTACT, PointContact, left_by_chance
 from kappaskin.estimation import Fit, PatternCache
 from kappaskin.frames import Array, Contact, LocalGeometry, Mask
@@ -35,7 +35,6 @@ _WORTH = 0.05  # a step that makes -2 ln of the likelihood no smaller than by th
 _HOPE = 3.0  # times what a step promises: more is not to be gained by all that follow
 _DAMPING, _EASED, _RAISED, _MOST = 1e-3, 0.2, 10.0, 1e6
 _FURTHEST = 0.05  # of a side, in one step
-_START, _LEAST, _LARGEST = 0.03, 1e-3, 0.2  # of the shorter side: radius of a load
 _RIM = 1 / 15  # of a side: within it, a load moves the skin too little to be told
 _LOUDEST = 1e12  # times the noise: beyond it, no load fits to rounding
 _RIDGE = 1e-9  # keeps what the readings do not determine solvable
@@ -188,10 +187,7 @@ class _Loads:
         self.patch, C, self._element = plate.patch, layout.channels, layout.element
         self._rows = np.zeros((4, C))
         self.influence = influence_of(plate, layout, edge, _FUNCTIONS, self._rows)
-        side = self.patch.a if self.patch.strip else min(self.patch.a, self.patch.b)
-        self.start, self._least, self._largest = (
-            (share * side) ** 2 for share in (_START, _LEAST, _LARGEST)
-        )
+        self.start, self._least, self._largest = sizes_on(self.patch)
         self._reach = _FURTHEST * np.array([self.patch.a, self.patch.b])
 
     def at(self, x: float, y: float, s: float) -> Array:

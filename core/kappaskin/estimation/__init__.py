@@ -27,6 +27,7 @@ from kappaskin.estimation.least_squares import LeastSquares as LeastSquares
 from kappaskin.estimation.placement import PLACEMENTS as PLACEMENTS
 from kappaskin.estimation.placement import check_placement as check_placement
 from kappaskin.estimation.placement import place_elements as place_elements
+from kappaskin.estimation.placement import place_for_loads as place_for_loads
 from kappaskin.estimation.placement import predicted_sd as predicted_sd
 from kappaskin.estimation.placement import singular_values as singular_values
 from kappaskin.estimation.region import Region as Region

@@ -5,6 +5,7 @@ placement makes the volume of that as small as can be, det M'M as large; an A-op
 variance of the displacement over the skin, trace (M'M)^-1 G with G the functions' mean products.
 Readings that differ in unit are divided by their noise first. Where their zero is unknown, M has a
 column for each offset, and G zeros: what is determined of the shape is what is left beside them.
+What elements tell of a load adds up: a placement may also make the mean error of loads small.
 """
 
 import math
@@ -50,6 +51,7 @@ _SWEEPS = 20  # over all elements at most; most placements are done after three 
 _GAIN = 1e-6  # of a criterion: a smaller one is not worth an exchange
 _CROWD = 1.6  # the power that draws clustered elements to the middle
 _MOST_CANDIDATES = 10_000
+_TRIED = 12  # places for one element that determines loads, of those that promise most
 _RIDGE = 1e-9  # of the information of a reading on average, so that too few elements are no error
 
 Placement = Callable[[SensorLayout, Basis, float, ArrayLike | None], SensorLayout]
@@ -120,6 +122,58 @@ def place_elements(
     readings differ in unit. Raises a `Refusal` where there is no room.
     """
     return PLACEMENTS[by](layout, basis, spacing, sigma)
+
+
+Told = Callable[[Array], tuple[Array, Array, Array]]
+"""What elements at places (C, 2) tell of n unknowns of each of G loads, (C, G, n, n).
+
+That is what adds to the inverse of their covariance V; beside it what is known beforehand (n, n),
+and weights E (m, G, n, n) of m kinds of errors: the mean square of one is the sum of trace E V.
+"""
+
+
+def place_for_loads(layout: SensorLayout, spacing: float, told: Told) -> SensorLayout:
+    """As many elements as `layout` has, at least `spacing` in m apart, that determine loads best.
+
+    They make the sum of the mean squares of all kinds of errors small, each over what it is with
+    the elements where they are, by exchanges of one element after the other. Where none gains,
+    that is `layout` itself. Raises a `Refusal` where there is no room.
+    """
+    places = _candidates(layout, spacing)
+    information, known, errors = told(np.concatenate([places, layout.positions]))
+    information, own = np.split(information, [len(places)])
+    told_now: Array = known + own.sum(axis=0)
+    ridge = _RIDGE * np.diag(np.diagonal(told_now, axis1=1, axis2=2).mean(axis=0))
+    V = _inverses(told_now + ridge)
+    E: Array = np.einsum("mgij,m->gij", errors, 1 / np.einsum("mgij,gij->m", errors, V))
+    chosen, free = _nearest(layout.positions, places), np.ones(len(places), bool)
+    free[chosen] = False
+    told_now = known + ridge + information[chosen].sum(axis=0)
+    least = float(np.vdot(E, _inverses(told_now)))
+    for _ in range(_SWEEPS):
+        before = least
+        for n, here in enumerate(chosen.tolist()):
+            others = told_now - information[here]
+            left_over = _inverses(others)
+            # What a little of an element would gain shows where to try all of it.
+            slope = left_over @ E @ left_over
+            gains = np.asarray(np.tensordot(information, slope, 3), float)
+            tried = np.flatnonzero(free)
+            for there in tried[np.argsort(gains[tried])[-_TRIED:]].tolist():
+                after = others + information[there]
+                left = float(np.vdot(E, _inverses(after)))
+                if left < least * (1 - _GAIN):
+                    least, told_now, chosen[n] = left, after, there
+            free[here], free[chosen[n]] = True, False
+        if least == before:
+            break
+    if least > len(errors) * (1 - _GAIN):
+        return layout
+    return replace(layout, positions=places[np.sort(chosen)], shape=None)
+
+
+def _inverses(W: Array) -> Array:
+    return np.asarray(np.linalg.inv(W), float)
 
 
 def _sigma_of_each(layout: SensorLayout, sigma: ArrayLike | None) -> Array:

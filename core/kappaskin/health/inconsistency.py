@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from kappaskin.frames import Array, Frame, Indices, Mask
 from kappaskin.sensing import Sensor, SensorLayout
+from kappaskin.skin import MeshSkin
 
 _LONG = 0.25  # s at least
 _OFTEN_UP_TO = 3000  # channels that are evaluated so often; more as much less often
@@ -107,6 +108,7 @@ _CLOSE = 1.6  # distances of elements: as far as they reach on a grid
 _LENGTHS = (1.2, 2.5)  # of what bends the skin, in distances of elements
 _NOISE = 1e-3  # in power, beside what a neighbour reads
 _MISSING = 1e9  # the same, of a reading that is not there
+_TINY = 1e-12
 _ELEMENTS_AT_ONCE = 512  # elements whose weights are computed together: 15 MB each time
 
 
@@ -163,6 +165,16 @@ def _covariance(distance: Array, steps: NDArray[np.int_]) -> Array:
     return total
 
 
+def _turned(c: Array, s: Array) -> Array:
+    """The map (..., 6, 6) of derivatives along x and y to those along axes at (c, s) from there."""
+    found = np.zeros((*c.shape, 6, 6))
+    found[..., 0, 0] = 1
+    found[..., 1:3, 1:3] = np.moveaxis(np.array([[c, s], [-s, c]]), (0, 1), (-2, -1))
+    rows = [c * c, s * s, 2 * c * s], [s * s, c * c, -2 * c * s], [-c * s, c * s, c * c - s * s]
+    found[..., 3:, 3:] = np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+    return found
+
+
 def _own_channels(layout: SensorLayout) -> tuple[Indices, Indices]:
     """The elements (E,) that have readings, and those readings (E, q) of each.
 
@@ -181,16 +193,24 @@ class Neighbours:
     prediction. `weights` (E, q, k q) are those of the `channels` (E, k q) around each; `spread`
     (E, q) is the variance of the prediction in units of the mean square of their readings.
     Elements without a reading count as none: `of` (C,) is the element of each channel.
+
+    On a mesh, distances and directions are those along the skin. Where the skin itself bends on a
+    shorter length than the elements tell, as where a held part of its rim ends, `soft` (C, N), the
+    readings of its softest shapes, make the variance as large as the prediction of these is wrong.
     """
 
-    def __init__(self, layout: SensorLayout) -> None:
+    def __init__(self, layout: SensorLayout, soft: Array | None = None) -> None:
         elements, self.own = _own_channels(layout)
         positions, E, q = layout.positions[elements], *self.own.shape
+        self._base, at = None, positions
+        if isinstance(layout.patch, MeshSkin):
+            self._base = layout.patch.base(*positions.T)
+            at = np.stack(self._base.point, axis=1)
         k = min(_COUNT, E - 1)
-        distance, near = scipy.spatial.KDTree(positions).query(positions, k + 1)
+        distance, near = scipy.spatial.KDTree(at).query(at, k + 1)
         near = cast("Indices", near).reshape(E, k + 1)[:, 1:]
         pitch = float(np.median(np.reshape(distance, (E, k + 1))[:, 1:2])) if k else 1.0
-        self._at = positions.T / (pitch or 1.0)
+        self._at = at / (pitch or 1.0)
         self.near = near
         """The elements (E, k) around each."""
         self.of: Indices = np.searchsorted(elements, layout.element)
@@ -201,12 +221,16 @@ class Neighbours:
         self.channels: Indices = self.own[near].reshape(E, k * q)
         self.adjacent: Indices = self.own[near[:, :_BESIDE]].reshape(E, -1)
         """The channels (E, c) of the elements next to each."""
-        close = (np.reshape(distance, (E, k + 1))[:, 1:] < _CLOSE * pitch).sum(axis=1)
+        away = np.reshape(distance, (E, k + 1))
+        # On a grid the four nearest are as near as the first; where elements lie unevenly they tell
+        # better how near others are.
+        side = float(np.median(away[:, min(4, k)]))
+        close = (away[:, 1:] < _CLOSE * side).sum(axis=1)
         self.alone: Array = _BESIDE / np.clip(close, 1, _BESIDE)
         """Ratio (E,) of the close neighbours inside a grid to those of each element."""
         kinds, kind = layout.directed
         parts = _derivatives(kinds)
-        used = np.flatnonzero(parts.any(axis=0))
+        used = np.flatnonzero(parts.any(axis=0)) if self._base is None else np.arange(6)
         self._steps = _STEPS[used]
         self._parts = parts[kind[self.own]][:, :, used]
         here = _covariance(np.zeros(2), self._steps)
@@ -222,6 +246,7 @@ class Neighbours:
             if len(set(layout.kind_units)) > 1:
                 order = _ORDERS[unit]
                 self.scale[units == unit] = math.sqrt(power) * (pitch or 1.0) ** (1 - order)
+        self._soft = None if soft is None else soft / self.scale[:, None]
         self.weights = np.zeros((E, q, k * q))
         self.spread = np.ones((E, q))
         self.exclude(np.zeros(layout.channels, bool), np.arange(len(near)))
@@ -235,13 +260,36 @@ class Neighbours:
         for start in range(0, len(elements), _ELEMENTS_AT_ONCE):
             self._weigh(missing, elements[start : start + _ELEMENTS_AT_ONCE])
 
+    def _seen_from(self, elements: Indices) -> tuple[Array, Array]:
+        """Where the neighbours of `elements` (n,) are from them (2, n, k), and their derivatives.
+
+        These (n, k, q, d) are along the axes of each of `elements`. On a mesh along the skin: as
+        far as on an arc that turns the normal as much, and with the axes turned by the least
+        turn of one normal to the other.
+        """
+        near = self.near[elements]
+        far, around = self._at[near] - self._at[elements, None], self._parts[near]
+        if self._base is None:
+            return np.moveaxis(far, 2, 0), around
+        frame, normal = self._base.frame, np.stack(self._base.normal, axis=1)
+        own, n, there = frame[elements], normal[elements][:, None], normal[near]
+        level = np.vecdot(n, there)
+        # An arc is as many times as long as its chord.
+        longer = 1 / np.sinc(np.arccos(np.clip(level, -1.0, 1.0)) / (2 * np.pi))
+        at = np.einsum("eai,eki->aek", own, far)
+        at *= longer * np.linalg.norm(far, axis=2) / np.maximum(np.hypot(*at), _TINY)
+        along = frame[near][:, :, 0]
+        share = np.vecdot(n, along) / np.maximum(1 + level, _TINY)
+        c, s = np.einsum("eai,eki->aek", own, along - share[:, :, None] * (n + there))
+        return at, around @ _turned(c, s)
+
     def _weigh(self, missing: Mask, elements: Indices) -> None:
-        at, around = self._at[:, self.near[elements]], self._parts[self.near[elements]]
+        at, around = self._seen_from(elements)
         n, k, q = around.shape[:3]
         between = _covariance(at[:, :, :, None] - at[:, :, None], self._steps)
         blocks = np.einsum("ekqi,ijekl,elrj->ekqlr", around, between, around, optimize=True)
         S: Array = blocks.reshape(n, k * q, k * q)
-        covariance = _covariance(at - self._at[:, elements, None], self._steps)
+        covariance = _covariance(at, self._steps)
         parts = (around, covariance, self._parts[elements])
         near: Array = np.einsum("ekqi,ijek,erj->ekqr", *parts, optimize=True).reshape(n, k * q, q)
         noise = np.where(missing[self.channels[elements]], _MISSING, _NOISE)
@@ -249,6 +297,12 @@ class Neighbours:
         W = cast("Array", np.linalg.solve(S, near))
         self.weights[elements] = W.swapaxes(1, 2)
         left = self._variance[elements] - np.sum(W * near, axis=1)
+        if self._soft is not None:
+            read = np.where(missing[:, None], 0.0, self._soft)[self.channels[elements]]
+            wrong = self._soft[self.own[elements]] - self.weights[elements] @ read
+            power = np.sum(read**2, axis=(1, 2))[:, None] / max(k * q, 1)
+            share = np.sum(wrong**2, axis=2) / np.where(power > 0, power, np.inf)
+            left = np.maximum(left, share)
         self.spread[elements] = np.maximum(left, 0.0)
 
     def predict(self, readings: Array, elements: Indices) -> tuple[Array, Array]:
@@ -323,9 +377,11 @@ class InconsistencyTest:
     reads more than predicted, may be `pressed` (C,) by such a load.
     """
 
-    def __init__(self, layout: SensorLayout, elastomer: bool = False) -> None:
+    def __init__(
+        self, layout: SensorLayout, elastomer: bool = False, soft: Array | None = None
+    ) -> None:
         C, self._sharp = layout.channels, _SHARP_IN_ELASTOMER if elastomer else _SHARP
-        self.neighbours = Neighbours(layout)
+        self.neighbours = Neighbours(layout, soft)
         self._every = np.arange(len(self.neighbours.own))
         self.missing = np.zeros(C, bool)
         self.reads: Array = np.full(C, np.nan)

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from kappaskin.bases import basis_for
 from kappaskin.errors import Refusal
 from kappaskin.frames import OVERTAKEN, Array, Frame, Mask
 from kappaskin.health.findings import (
@@ -22,6 +23,7 @@ from kappaskin.health.findings import (
 )
 from kappaskin.health.inconsistency import ChannelStatistics, InconsistencyTest, StatisticsWindow
 from kappaskin.sensing import DigitalReadings, Sensor
+from kappaskin.skin import MeshSkin
 
 _FAR = 4.0  # standard deviations: a channel that is further off is suspected
 _NEAR = 2.5  # the same: one that is nearer agrees with the others again
@@ -32,6 +34,7 @@ _LOUD = 4.0  # times the noise of the others
 _LOUDS, _LOUD_OF = 5, 32  # evaluations with so much noise, of so many, make a noisy channel
 _RAILED, _FREE = 0.5, 0.05  # share of the readings of a second that are on a rail
 _SECOND = 4  # evaluations
+_SOFTEST = 5  # times as many functions of a mesh, by which its elements' readings are predicted
 _WITHIN = 0.25  # of the rail: where less is predicted, nothing bends the skin so far
 
 _LOOSE = (NOISY, OFFSET, DRIFTING)  # which a more specific fault may replace
@@ -63,6 +66,11 @@ class HealthMonitor:
         self.sensor = sensor
         self._dead = ~sensor.layout.live.ravel()
         self._window = StatisticsWindow(sensor)
+        self._soft: Array | None = None
+        if isinstance(sensor.layout.patch, MeshSkin):
+            basis = basis_for(sensor.layout.patch, sensor.edge, _SOFTEST, _SOFTEST)
+            read = sensor.layout.operator(basis, sensor.plate)
+            self._soft = sensor.plate.compliance(basis).after(read)
         self.reset()
 
     def reset(self) -> None:
@@ -70,7 +78,8 @@ class HealthMonitor:
         layout, C = self.sensor.layout, self.sensor.channels
         elastomer, units = self.sensor.plate.unknown_material, set(layout.kind_units)
         predictable = units == {"m"} or not elastomer
-        self._predicted = InconsistencyTest(layout, elastomer) if predictable else None
+        soft = self._soft if predictable else None
+        self._predicted = InconsistencyTest(layout, elastomer, soft) if predictable else None
         self.kinds = np.where(layout.lacking.ravel(), DEAD, 0).astype(np.uint8)
         self._since, self._figures = np.full(C, math.nan), np.full((C, 2), math.nan)
         self._suspects = np.zeros(C, bool)

@@ -7,6 +7,7 @@ from kappaskin.live.differences import difference_errors as difference_errors
 from kappaskin.live.differences import reading_noise as reading_noise
 from kappaskin.live.engine import LONGEST_NOTE as LONGEST_NOTE
 from kappaskin.live.engine import Engine as Engine
+from kappaskin.live.engine import Fingers as Fingers
 from kappaskin.live.pipelines import PipelineStatus as PipelineStatus
 from kappaskin.live.region_tracking import track_region as track_region
 from kappaskin.live.resume import ResumeInfo as ResumeInfo

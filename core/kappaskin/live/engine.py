@@ -1,9 +1,9 @@
-"""Engine: starts the engine process, sends requests, reads status and estimates."""
+"""Engine: starts the engine process, sends requests, reads status and estimates; of a hand each."""
 
 import math
 import multiprocessing
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kappaskin._processes import starting_process
 from kappaskin.errors import Refusal
@@ -32,8 +33,8 @@ from kappaskin.live.resume import ResumedProcess, ResumeInfo, resume_process
 from kappaskin.live.ring import Ring
 from kappaskin.live.status import LOST, STREAMING, Status
 from kappaskin.pipeline import Setup
-from kappaskin.publish import access_of, targets_of
-from kappaskin.recording import unused
+from kappaskin.publish import access_of, of_finger, targets_of
+from kappaskin.recording import HandPart, HandRecorder, RecordingStatus, unused
 from kappaskin.scenes import Playback, Scene
 
 LONGEST_NOTE = 500
@@ -64,7 +65,7 @@ class Engine:
     All requests are one value, `Requested`, which is sent to the engine. The process ends when
     `close` is called, or within a second after this process ended. With a folder to `resume_from`,
     a process that records continues for `patience` s instead, and the next `Engine` with that
-    folder resumes it instead of starting one: `resumed` describes it.
+    folder resumes it instead of starting one: `resumed` describes it. Messages name the `finger`.
     """
 
     def __init__(
@@ -72,6 +73,7 @@ class Engine:
         setup: Setup | None = None,
         resume_from: Path | None = None,
         patience: float = _PATIENCE,
+        finger: str = "",
     ) -> None:
         self._resume_from, self._patience = resume_from, patience
         self._deaths: list[float] = []
@@ -83,7 +85,8 @@ class Engine:
         self._in_use = Requested()  # as it was before the newest source was requested
         process = resume_process(resume_from) if resume_from else None
         if process is None:
-            self._requests = RequestSender(Requested().changing(setup=setup or Setup()))
+            first = Requested().changing(setup=setup or Setup(), finger=finger)
+            self._requests = RequestSender(first)
             self._ring, self._compared_ring = Ring.pair()
             try:
                 self._start(Status(setup=self.requested.setup))
@@ -155,7 +158,7 @@ class Engine:
             self._ring.write_status(was.after((Event(now, "engine", _GIVEN_UP),)))
             return
         requested = self.requested
-        if requested.recording is not None:
+        if isinstance(requested.recording, Path):
             # Beside the one that broke off, which `repair` makes whole.
             self._requests.change(recording=unused(requested.recording))
         self._start_again(Event(now, "engine", _AGAIN))
@@ -274,9 +277,12 @@ class Engine:
         """Take a tare; `status` has the result, which is in use once a setup contains it."""
         self._requests.act(TakeTare())
 
-    def record(self, path: Path | None) -> None:
-        """Record to `path` from now on, or end recording with None; `status` has the result."""
-        self._requests.change(recording=path and path.absolute())
+    def record(self, path: Path | HandPart | None) -> None:
+        """Record to `path` from now on, or end recording with None; `status` has the result.
+
+        It may be the part of this finger in the recording of a hand, `HandRecorder.part`.
+        """
+        self._requests.change(recording=path.absolute() if isinstance(path, Path) else path)
 
     def store_window_state(self, data: bytes) -> None:
         """Store `data` in the engine for a window that resumes it."""
@@ -368,3 +374,103 @@ class Engine:
         self._requests.say_goodbye()
         self._reap()
         self._release_memory()
+
+
+class Fingers:
+    """The engines of the fingers of a hand by their names, each a process with a source of its own.
+
+    One that is lost, stalls or dies leaves the others alone; `revive` starts one that died again. A
+    hand of one has a finger without a name. All frames are on one clock, this machine's monotonic
+    one: the scan of an estimate began at `taken` +- `taken_sd`.
+    """
+
+    def __init__(self, fingers: Iterable[str], setup: Setup | None = None) -> None:
+        self.engines: dict[str, Engine] = {}
+        self._recorder: HandRecorder | None = None
+        try:
+            for finger in fingers:
+                self.engines[finger] = Engine(setup, finger=finger)
+        except BaseException:
+            self.close()
+            raise
+
+    def connect(self, sources: Mapping[str, str], trust: bool = False) -> None:
+        """Take frames of each finger from its source."""
+        for finger, source in sources.items():
+            self.engines[finger].connect(source, trust)
+
+    def record(self, path: Path) -> None:
+        """Record all fingers to one file from now on; a `Refusal` where there can be none."""
+        self._recorder = HandRecorder(path.absolute(), tuple(self.engines))
+        for finger, engine in self.engines.items():
+            engine.record(self._recorder.part(finger))
+
+    def publish(self, targets: Sequence[str], origins: Sequence[str] = ()) -> None:
+        """Send estimates of all fingers to `targets`, as `Engine.publish` does.
+
+        Messages name the finger. Of servers each finger has one, at ports that follow each other.
+        """
+        for number, engine in enumerate(self.engines.values()):
+            engine.publish(of_finger(targets, number), origins)
+
+    @property
+    def recording(self) -> RecordingStatus:
+        """The state of the file of all fingers."""
+        return self._recorder.poll() if self._recorder else RecordingStatus()
+
+    def revive(self) -> None:
+        """Start each process that died again; to be called now and then."""
+        for engine in self.engines.values():
+            engine.revive()
+
+    def status(self) -> dict[str, Status]:
+        return {finger: engine.status() for finger, engine in self.engines.items()}
+
+    def aligned(self, statuses: Mapping[str, Status]) -> dict[str, Estimate]:
+        """An estimate of each finger that streams, all of scans nearest to one time.
+
+        That is the newest time which all of them have reached. Each began at `taken` +- `taken_sd`
+        in s on this machine's clock, within a scan's period of that time; a finger whose clock is
+        not known yet has none.
+        """
+        taken = dict[str, tuple[NDArray[Any], NDArray[Any]]]()
+        for finger, status in statuses.items():
+            _, fields, _ = self.engines[finger].recent(status, 0, ["taken", "sequence"])
+            if status.state == STREAMING and fields and np.isfinite(fields[0]).any():
+                taken[finger] = fields[0], fields[1]
+        at = min((float(np.nanmax(times)) for times, _ in taken.values()), default=math.nan)
+        found = dict[str, Estimate]()
+        for finger, (times, sequences) in taken.items():
+            nearest = int(sequences[np.nanargmin(np.abs(times - at))])
+            estimate = self.engines[finger].latest(statuses[finger], nearest)
+            if estimate is not None:
+                found[finger] = estimate
+        return found
+
+    def stop_recording(self) -> None:
+        """End the file; `recording` says when it is whole."""
+        for engine in self.engines.values():
+            engine.record(None)
+        if self._recorder is not None:
+            self._recorder.end()
+
+    def end_recording(self, within: float = _WRITTEN) -> RecordingStatus:
+        """End the file, and wait until it is whole, for `within` s at most; its last state."""
+        self.stop_recording()
+        if self._recorder is None:
+            return RecordingStatus()
+        self._recorder.close(within)
+        return self._recorder.written
+
+    def __enter__(self) -> "Fingers":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End all processes; what is recorded is whole then."""
+        for engine in self.engines.values():
+            engine.close()
+        if self._recorder is not None:
+            self._recorder.close(_WRITTEN)

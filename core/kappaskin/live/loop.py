@@ -125,7 +125,7 @@ class EngineLoop:
                 self._status = replace(self._status, region=requested.region)
                 self._track_region()
             case "targets":
-                self._publishing.request(requested.targets, requested.access)
+                self._publishing.request(requested.targets, requested.access, requested.finger)
                 self._haste(self._publishing.active)
             case "source":
                 self._go_to(requested.source)
@@ -376,7 +376,8 @@ class EngineLoop:
 
     def _check_health(self, frame: Frame) -> None:
         """Check the health of the channels, and exclude faulty ones from the fit."""
-        if self._health(frame):
+        # On a mesh a monitor needs functions, which the pipeline has made by then.
+        if self._main.pipeline is not None and self._health(frame):
             self._exclude(self._main)
             self._exclude(self._compared.host)
 

@@ -260,11 +260,13 @@ class LiveHealthMonitor:
     """Monitors the channels of the sensor that is connected."""
 
     def __init__(self) -> None:
+        self._sensor: Sensor | None = None
         self._monitor: HealthMonitor | None = None
         self._effects: object = None  # of a simulated scene
 
     def connect(self, sensor: Sensor | None) -> None:
-        self._monitor = None if sensor is None else HealthMonitor(sensor)
+        """Begin with another sensor, at the first frame."""
+        self._sensor, self._monitor = sensor, None
 
     def follow_scene(self, scene: Scene) -> None:
         """Restart where other effects are simulated: they may shift every channel."""
@@ -275,6 +277,8 @@ class LiveHealthMonitor:
 
     def __call__(self, frame: Frame) -> bool:
         """Take the next frame; whether other channels than before may be faulty."""
+        if self._monitor is None and self._sensor is not None:
+            self._monitor = HealthMonitor(self._sensor)
         return self._monitor is not None and self._monitor(frame)
 
     def exclude(self, host: PipelineHost) -> bool:

@@ -7,7 +7,7 @@ from pathlib import Path
 from kappaskin.errors import Refusal
 from kappaskin.frames import Estimate, Event, Frame
 from kappaskin.live.pipelines import PipelineHost
-from kappaskin.recording import Recorder, RecordingStatus, ReplayedSource
+from kappaskin.recording import HandPart, Recorder, RecordingStatus, ReplayedSource
 from kappaskin.sources import SimulatedSource, Source
 
 
@@ -29,7 +29,9 @@ class LiveRecorder:
     def active(self) -> bool:
         return self._recorder is not None
 
-    def begin(self, path: Path | None, source: Source | None, host: PipelineHost) -> None:
+    def begin(
+        self, path: Path | HandPart | None, source: Source | None, host: PipelineHost
+    ) -> None:
         """Record to `path` from now on, instead of to the file before; to none if None."""
         self.end(source)
         if path is None:
@@ -40,7 +42,7 @@ class LiveRecorder:
                 raise Refusal("expected a live source to record, got a recording; copy its file")
             recorder = self._recorder = self._newest = Recorder(path, time.monotonic())
         except Refusal as refusal:
-            self.status = RecordingStatus(str(path), trouble=str(refusal))
+            self.status = RecordingStatus(str(Path(path)), trouble=str(refusal))
             return
         self.connect(source)
         if host.pipeline is not None:

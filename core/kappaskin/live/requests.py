@@ -17,6 +17,7 @@ from typing import Any
 from kappaskin.estimation import Region
 from kappaskin.pipeline import Setup
 from kappaskin.publish import THIS_MACHINE, Access
+from kappaskin.recording import HandPart
 from kappaskin.scenes import Scene
 
 _RESEND = 0.5  # s after which an engine that reports, but not of what was sent, did not get it
@@ -79,14 +80,17 @@ class Requested:
     """All that is requested of the engine; another engine can continue with it.
 
     Lasting settings come first: `targets` that are servers have `access`, with `trust` the scene
-    that `source` names may name files outside its folder, a scene or recording plays at `speed`,
-    `looped` or not, a recording shows recorded estimates unless it `recomputes` them, `added_noise`
-    in 1/m is added to the readings of shown estimates, and `window_state` is stored for a window
+    that `source` names may name files outside its folder, `recording` is a file or the part of a
+    finger in that of a hand, whose messages name the `finger`, a scene or recording plays at
+    `speed`, `looped` or not, a recording shows recorded estimates unless it `recomputes` them,
+    `added_noise` in 1/m is added to the readings of shown estimates, and `window_state` is stored
+    for a window
     that resumes the engine. `actions` are the last ones, each with the `number` of the value that
     added it; `changed` has the number with which each setting was last requested. `over` ends the
     engine.
     """
 
+    finger: str = ""
     setup: Setup = field(default_factory=Setup)
     compared: Setup | None = None
     region: Region = field(default_factory=Region)
@@ -95,7 +99,7 @@ class Requested:
     source: str | None = None
     trust: bool = False
     scene: Scene | None = None
-    recording: Path | None = None
+    recording: Path | HandPart | None = None
     speed: float = 1.0
     looped: bool = False
     recomputes: bool = False

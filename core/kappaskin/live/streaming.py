@@ -4,7 +4,9 @@ import os
 import time
 import weakref
 from collections import deque
+from collections.abc import Generator, Iterator, Mapping
 from pathlib import Path
+from typing import overload
 
 from kappaskin.errors import EndedSource, Refusal, SourceError
 from kappaskin.frames import Estimate, Frame
@@ -15,6 +17,7 @@ from kappaskin.sensing import Sensor
 from kappaskin.sources import described_source, open_source
 
 _READ = 0.1  # s that a read may wait
+_NAP = 1e-3  # s between two reads where no finger has a frame
 _WAITING = 64  # frames that wait to be taken at most
 
 
@@ -43,9 +46,19 @@ class Stream:
         return self
 
     def __next__(self) -> Estimate:
-        self._receive()
-        while self._finish.alive and not self._waiting:
-            self._receive()
+        estimate = self.poll(_READ)
+        while estimate is None:
+            estimate = self.poll(_READ)
+        return estimate
+
+    def poll(self, timeout: float = 0.0) -> Estimate | None:
+        """The next estimate, where its frame comes within `timeout` s; else None.
+
+        A `StopIteration` at the end, and what the loop raises.
+        """
+        self._receive(timeout)
+        if self._finish.alive and not self._waiting:
+            return None
         if self._waiting and self._pipeline is not None and self._health is not None:
             frame = self._waiting.popleft()
             estimate = self._pipeline(frame)
@@ -55,13 +68,13 @@ class Stream:
         failure, self._failure = self._failure, None
         raise failure or StopIteration
 
-    def _receive(self) -> None:
-        """Read what has arrived up to now; wait for it where nothing else waits."""
+    def _receive(self, timeout: float) -> None:
+        """Read what has arrived up to now; wait for it for `timeout` s where nothing else waits."""
         if not self._finish.alive or (self._waiting and self._source.patient):
             return
         began = time.monotonic()
         try:
-            frames = self._take(0.0 if self._waiting else _READ)
+            frames = self._take(0.0 if self._waiting else timeout)
             while frames and frames[-1].host_time < began and not self._source.patient:
                 frames = self._take(0.0)
             if isinstance(self._source, ReplayedSource) and self._source.ended:
@@ -106,12 +119,77 @@ class Stream:
         self.close()
 
 
+class HandStream:
+    """The estimates of several fingers, each with the name of its finger; iterate over it once.
+
+    `streams` are those of the fingers. One that fails, as by a connection that is lost, ends and
+    leaves the others alone: `failures` says why. The loop ends with the last of them; it raises the
+    first failure where no finger ended otherwise.
+    """
+
+    def __init__(self, streams: Mapping[str, Stream]) -> None:
+        self.streams = dict(streams)
+        self.failures: dict[str, Refusal] = {}
+        self._open = dict(streams)
+
+    def __iter__(self) -> Generator[tuple[str, Estimate]]:
+        while self._open:
+            found = [each for finger in tuple(self._open) for each in self._next(finger)]
+            yield from found
+            if not found and self._open:
+                time.sleep(_NAP)
+        if self.failures and self.failures.keys() == self.streams.keys():
+            raise next(iter(self.failures.values()))
+
+    def _next(self, finger: str) -> Iterator[tuple[str, Estimate]]:
+        """The next estimate of a finger, where a frame of it has come."""
+        try:
+            estimate = self._open[finger].poll()
+        except StopIteration:
+            del self._open[finger]
+        except Refusal as failure:
+            self.failures[finger] = failure
+            del self._open[finger]
+        else:
+            if estimate is not None:
+                yield finger, estimate
+
+    def close(self) -> None:
+        """Close all sources; the frames that wait can still be taken."""
+        for each in self.streams.values():
+            each.close()
+
+    def __enter__(self) -> "HandStream":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+@overload
 def stream(
     source: str,
     sensor: str | os.PathLike[str] | None = None,
     setup: Setup | None = None,
     trust: bool = False,
-) -> Stream:
+) -> Stream: ...
+
+
+@overload
+def stream(
+    source: Mapping[str, str],
+    sensor: None = None,
+    setup: Setup | None = None,
+    trust: bool = False,
+) -> HandStream: ...
+
+
+def stream(
+    source: str | Mapping[str, str],
+    sensor: str | os.PathLike[str] | None = None,
+    setup: Setup | None = None,
+    trust: bool = False,
+) -> Stream | HandStream:
     """The estimates of a `source`: `sim:SCENE`, `replay:FILE`, `feed:NAME`, a port or a URL.
 
     `sensor` is a file that describes a sensor with a line format of its own. Without a `setup`, it
@@ -119,6 +197,19 @@ def stream(
     determines. With `trust` a scene may name files
     outside its folder. Raises a `SourceError` where the source cannot be opened, and a `Refusal`
     for a setup that the sensor does not allow.
+
+    Of a hand, sources by the names of fingers, `stream({"thumb": "sim:", "index": "sim:"})`, it is
+    the estimates of all, each with the name of its finger before it, in the order in which they
+    come. All are on one clock: the scan began at `taken` +- `taken_sd`.
     """
+    if not isinstance(source, str):
+        streams = dict[str, Stream]()
+        try:
+            for finger, each in source.items():
+                streams[finger] = Stream(each, setup, trust)
+        except BaseException:
+            HandStream(streams).close()
+            raise
+        return HandStream(streams)
     name = source if sensor is None else described_source(Path(sensor).absolute(), source)
     return Stream(name, setup, trust)

@@ -62,6 +62,8 @@ def _unmixed(values: Array) -> Array:
     return own.copy() if (shared <= _UNMIXED**2 * np.multiply.outer(own, own)).all() else values
 
 
+_AT_ENDS = 0.85  # over the root of the number of nodes, of a force (`tests/truths/test_meshes.py`)
+
 USUAL_THICKNESS = 0.25e-3
 """Thickness in m of a bent skin that was given none: substrate and gages."""
 
@@ -241,7 +243,8 @@ class Plate:
 
         And on a shallow skin of the distance of its place from the middle. On a mesh it is half of
         h H / 12, by which measures of bending that are as right to first order (Love's, Sanders',
-        Koiter's) differ where strains of bending are as large as those of stretching.
+        Koiter's) differ where strains of bending are as large as those of stretching; and where
+        only a part of its rim is held, that of the finite elements around the ends of that part.
 
         1 / (R k)^2 of the longest wave times its share of bending, twice where the edges are
         diaphragms, four times where they are free, not where they are held: a saddle's, mostly,
@@ -251,7 +254,8 @@ class Plate:
             xx, yy, xy = self.patch.read_at_rest(self.patch.places)
             square: Array = xx**2 + yy**2 + 2 * xy**2
             H = math.sqrt(float(square.mean()) / 2)
-            return (self.sheet_thickness or 0.0) * H / 24
+            ends = _AT_ENDS * self.patch.is_held_in_part / math.sqrt(len(self.patch.points))
+            return math.hypot((self.sheet_thickness or 0.0) * H / 24, ends)
         times = {"diaphragm": 2.0, "free": 4.0}.get(self.inplane_edge, 0.0)
         if not self.patch.is_shallow or not times:
             return 0.0

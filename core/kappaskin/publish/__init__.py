@@ -8,5 +8,6 @@ from kappaskin.publish.publishing import Latency as Latency
 from kappaskin.publish.publishing import Publishing as Publishing
 from kappaskin.publish.publishing import PublishStatus as PublishStatus
 from kappaskin.publish.publishing import TargetStatus as TargetStatus
+from kappaskin.publish.publishing import of_finger as of_finger
 from kappaskin.publish.publishing import targets_of as targets_of
 from kappaskin.publish.udp import UdpListener as UdpListener

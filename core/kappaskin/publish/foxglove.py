@@ -54,7 +54,6 @@ _SERVER_INFO: _Answer = {
     "capabilities": [],
     "sessionId": str(time.time_ns()),  # of this process: a client that reconnects continues
 }
-_ADVERTISED = {"op": "advertise", "channels": [channel.advertised for channel in CHANNELS]}
 _BY_NUMBER = {channel.number: channel for channel in CHANNELS}
 
 LARGEST = 65536  # bytes of a client's message
@@ -78,8 +77,10 @@ class FoxgloveClient:
     it was not let in. It is connected `since` a monotonic time in s, once the handshake is done.
     """
 
-    def __init__(self, made: socket.socket, name: str, check: AccessCheck) -> None:
-        self.socket, self.name, self._check = made, name, check
+    def __init__(
+        self, made: socket.socket, name: str, check: AccessCheck, finger: str = ""
+    ) -> None:
+        self.socket, self.name, self._check, self._finger = made, name, check, finger
         made.setblocking(False)
         made.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _WAITING)
         self._protocol = ServerProtocol(
@@ -209,7 +210,8 @@ class FoxgloveClient:
             if self._protocol.state is State.OPEN:
                 self.since = time.monotonic()
                 self._reply(_SERVER_INFO)
-                self._reply(_ADVERTISED)
+                advertised = [channel.advertised(self._finger) for channel in CHANNELS]
+                self._reply({"op": "advertise", "channels": advertised})
         elif isinstance(event, Frame) and event.opcode in (Opcode.TEXT, Opcode.BINARY):
             if event.opcode is Opcode.TEXT and event.fin and self._handle(bytes(event.data)):
                 return
@@ -302,7 +304,7 @@ def opened(target: Target) -> "Foxglove":
     except Refusal:
         server.close()
         raise
-    return Foxglove(server, target.port, check)
+    return Foxglove(server, target.port, check, target.finger)
 
 
 def _listening(family: int, address: Any) -> socket.socket:
@@ -321,10 +323,15 @@ def _listening(family: int, address: Any) -> socket.socket:
 
 
 class Foxglove:
-    """Serves clients that come and go on the listening socket `server` if `check` accepts them."""
+    """Serves clients that come and go on the listening socket `server` if `check` accepts them.
 
-    def __init__(self, server: socket.socket, port: int, check: AccessCheck) -> None:
-        self._server, self._check = server, check
+    Of a hand it serves one `finger`, whose name is in the topics.
+    """
+
+    def __init__(
+        self, server: socket.socket, port: int, check: AccessCheck, finger: str = ""
+    ) -> None:
+        self._server, self._check, self._finger = server, check, finger
         invitation = check.invitation("ws", port)
         self.notices = (invitation,) if invitation else ()
         self._clients: tuple[FoxgloveClient, ...] = ()  # replaced whole: two threads read it
@@ -413,7 +420,8 @@ class Foxglove:
         with suppress(OSError):  # it went away again
             made, address = self._server.accept()
             made.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            client = FoxgloveClient(made, f"{address[0]}:{address[1]}", self._check)
+            name = f"{address[0]}:{address[1]}"
+            client = FoxgloveClient(made, name, self._check, self._finger)
             self._clients = (*self._clients, client)
             self._selector.register(made, selectors.EVENT_READ, client)
 

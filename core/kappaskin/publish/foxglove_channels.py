@@ -38,11 +38,11 @@ class Channel:
     encoding: str = "json"
     language: str = "jsonschema"
 
-    @property
-    def advertised(self) -> dict[str, object]:
+    def advertised(self, finger: str) -> dict[str, object]:
+        """What a client is told of it; the topic of a `finger` begins with its name."""
         return {
             "id": self.number,
-            "topic": self.topic,
+            "topic": f"/{finger}{self.topic}" if finger else self.topic,
             "encoding": self.encoding,
             "schemaName": self.name,
             "schema": self.schema,

@@ -128,13 +128,19 @@ class MessageHeader:
 
     `source` is where the readings come from, live, sim or replay; `epoch` in s since 1970 when this
     machine's monotonic clock began; `number` counts messages. The coefficients go with it if it is
-    `with_shape`.
+    `with_shape`. Of a hand it names the `finger`.
     """
 
     source: str
     epoch: float
     number: int
     with_shape: bool
+    finger: str = ""
+
+    def begin(self, kind: str) -> str:
+        """The beginning of a message of a `kind`."""
+        finger = f'"finger":"{self.finger}",' if self.finger else ""
+        return f'"kind":"{kind}","version":{VERSION},{finger}'
 
 
 class EstimateMessage:
@@ -179,7 +185,7 @@ class EstimateMessage:
         """The message about the contact, as JSON."""
         flags = [_yes(flag) for flag in _flags(self._reported)]
         text = (
-            f'{{"kind":"contact","version":{VERSION},"source":"{self.mark.source}",'
+            f'{{{self.mark.begin("contact")}"source":"{self.mark.source}",'
             f"{_FLAGS_TEXT % (*flags, _yes(self.shape_follows))},{_numbers(self.values)},"
             f'"second":{self._second}}}'
         )
@@ -199,7 +205,7 @@ class EstimateMessage:
         edge = pipeline.setup.edge or pipeline.sensor.edge
         Ni, Nj = self.estimate.coefficients.shape
         text = (
-            f'{{"kind":"shape","version":{VERSION},{_HEAD_WHOLE % self._head()},'
+            f"{{{self.mark.begin('shape')}{_HEAD_WHOLE % self._head()},"
             f'"edge":"{edge}","functions_x":{Ni},"functions_y":{Nj},'
             f'"coefficients_m":[{text_of(fit.coefficients.ravel().tolist(), "%.6g")}],'
             f'"coefficients_sd_m":[{text_of(fit.sd.ravel().tolist(), "%.3g")}]}}'
@@ -212,7 +218,7 @@ class SourceState:
     """How the source is doing, and the `events` since that was last reported.
 
     `source` is live, sim or replay, empty while there is no sensor; `last_frame` in s on the
-    monotonic clock, `rate` in frames/s.
+    monotonic clock, `rate` in frames/s; `finger` is empty where there is one without a name.
     """
 
     state: str
@@ -222,6 +228,7 @@ class SourceState:
     rate: float
     last_frame: float
     events: tuple[Event, ...] = ()
+    finger: str = ""
 
     def encoded(self) -> bytes:
         """The message about the source, as JSON."""
@@ -235,6 +242,7 @@ class SourceState:
         fields = {
             "kind": "status",
             "version": VERSION,
+            **({"finger": self.finger} if self.finger else {}),
             "timestamp": round(time.time(), 6),
             "state": self.state,
             "source": self.source,

@@ -74,12 +74,16 @@ _LONGEST = 253  # characters of a name on the internet
 
 @dataclass(frozen=True)
 class Target:
-    """Destination of messages, by `scheme` their transport; `access` where others connect to it."""
+    """Destination of messages, by `scheme` their transport; `access` where others connect to it.
+
+    Of a hand it is that of one `finger`.
+    """
 
     scheme: str
     host: str
     port: int
     access: Access = THIS_MACHINE
+    finger: str = ""
 
     def __str__(self) -> str:
         host = f"[{self.host}]" if ":" in self.host else self.host
@@ -120,6 +124,19 @@ def targets_of(texts: Sequence[str], access: Access = THIS_MACHINE) -> tuple[Tar
     if len(targets) > MOST_TARGETS:
         raise Refusal(f"expected at most {MOST_TARGETS} targets, got {len(targets)}")
     return targets
+
+
+def of_finger(texts: Sequence[str], number: int) -> list[str]:
+    """The targets with these names for the finger of this `number` in a hand, from 0.
+
+    A receiver gets the messages of all fingers; of servers each finger has one, at the port so many
+    higher. A `Refusal` where that is none.
+    """
+    targets = (
+        replace(target, port=target.port + number * (target.scheme in _SERVERS))
+        for target in targets_of(texts)
+    )
+    return [str(target) for target in targets_of([str(target) for target in targets])]
 
 
 def reason(error: OSError | UnicodeError) -> str:
@@ -243,17 +260,20 @@ class Publishing:
     def __init__(self, how: Opened = opened, clock: Callable[[], float] = time.monotonic) -> None:
         self._how, self._clock = how, clock
         self._places: list[_OpenTarget] = []
-        self._source, self._epoch = "", epoch()
+        self._source, self._epoch, self._finger = "", epoch(), ""
         self._number, self._next_shape = 0, -math.inf
         self._parts: deque[tuple[float, float, float]] = deque(maxlen=_KEPT)
         self._latency, self._next_check = Latency(), -math.inf
 
-    def request(self, texts: Sequence[str], access: Access = THIS_MACHINE) -> None:
-        """Publish to these targets, of which servers have `access`.
+    def request(
+        self, texts: Sequence[str], access: Access = THIS_MACHINE, finger: str = ""
+    ) -> None:
+        """Publish to these targets, of which servers have `access`, what a `finger` feels.
 
         Open ones stay open, refused ones are retried; servers of other access are opened again.
         """
-        targets = targets_of(texts, access)
+        self._finger = finger
+        targets = [replace(each, finger=finger) for each in targets_of(texts, access)]
         open_already = {p.target: p for p in self._places if p.target in targets and not p.refusal}
         for place in self._places:
             if place.target not in open_already:
@@ -282,7 +302,7 @@ class Publishing:
         with_shape = began >= self._next_shape
         if with_shape:
             self._next_shape = began + SHAPES
-        mark = MessageHeader(self._source, self._epoch, self._number, with_shape)
+        mark = MessageHeader(self._source, self._epoch, self._number, with_shape, self._finger)
         message = EstimateMessage(estimate, fit, pipeline, mark)
         self._number += 1
         for sender in senders:
@@ -296,7 +316,7 @@ class Publishing:
         for place in self._places:
             place.check()
             if place.publisher is not None:
-                place.publisher.report(state)
+                place.publisher.report(replace(state, finger=self._finger))
 
     @property
     def status(self) -> PublishStatus:

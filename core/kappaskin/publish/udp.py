@@ -5,7 +5,9 @@ import json
 import math
 import socket
 import time
+from collections import defaultdict
 from contextlib import suppress
+from dataclasses import dataclass
 from typing import Any, cast
 
 from kappaskin._text import NO_FORCE, ONE_SIGMA, SNAPS, printable, with_error
@@ -122,21 +124,33 @@ _BUFFER = 2**20  # bytes that may wait while this process sleeps
 _LARGEST = 65536
 _ENDLESS = 1e300  # larger than any published quantity
 _AT_ONCE = 1000  # datagrams read in one call at most
+_FINGERS = 64  # that count for themselves at most
 
 JsonMessage = dict[str, Any]
 
 
+@dataclass
+class _Heard:
+    """What was received last of one finger: its sender, number and state, and when it was shown."""
+
+    sender: object = None
+    number: int | None = None
+    shown: float = -math.inf
+    state: str = ""
+
+
 class UdpListener:
-    """Messages received on a UDP `port`, as lines of text; gaps in `number` are losses."""
+    """Messages received on a UDP `port`, as lines of text; gaps in `number` are losses.
+
+    Each finger of a hand counts for itself.
+    """
 
     def __init__(self, port: int) -> None:
         if not 0 < port < 65536:
             raise Refusal(f"expected a port from 1 to 65535, got {port}")
         self._began = time.monotonic()
         self._socket = _bound(port)
-        self._number: int | None = None
-        self._shown, self._state = -math.inf, ""
-        self._sender: object = None
+        self._heard = defaultdict[str, _Heard](_Heard)
         self.contacts = self.lost = self.foreign = 0
 
     def read(self, timeout: float) -> list[JsonMessage]:
@@ -151,34 +165,42 @@ class UdpListener:
                 if message is None:
                     self.foreign += 1
                     continue
-                if self._sender not in (None, sender):
-                    self._number = None  # another one counts for itself
-                self._sender = sender
+                heard = self._of(message)
+                if heard.sender not in (None, sender):
+                    heard.number = None  # another one counts for itself
+                heard.sender = sender
                 came.append(message)
         return came
 
+    def _of(self, message: JsonMessage) -> _Heard:
+        finger = str(message.get("finger", ""))
+        known = finger in self._heard or len(self._heard) < _FINGERS
+        return self._heard[finger if known else ""]
+
     def lines(self, message: JsonMessage) -> list[str]:
         """Lines for a message and for a gap before it; none where nothing new is to be shown."""
-        lines: list[str] = []
+        lines, heard = list[str](), self._of(message)
         if message["kind"] == "contact":
-            lines += self._gap(message.get("number"))
+            lines += self._gap(heard, message.get("number"))
             now = time.monotonic()
-            if now - self._shown >= _SHOWN:
-                self._shown = now
+            if now - heard.shown >= _SHOWN:
+                heard.shown = now
                 lines.append(_words(message))
         elif message["kind"] == "status":
             state = f"{message.get('state')}  {message.get('sensor')}  {message.get('message')}"
-            if state != self._state:
+            if state != heard.state:
                 lines.append(f"status    {state}")
-            self._state = state
-        return [f"{time.monotonic() - self._began:9.3f} s  {printable(line)}" for line in lines]
+            heard.state = state
+        finger = f"{message['finger']!s:.32}  " if message.get("finger") else ""
+        seconds = time.monotonic() - self._began
+        return [f"{seconds:9.3f} s  {printable(finger + line)}" for line in lines]
 
-    def _gap(self, number: object) -> list[str]:
-        last, self._number = self._number, number if isinstance(number, int) else None
+    def _gap(self, heard: _Heard, number: object) -> list[str]:
+        last, heard.number = heard.number, number if isinstance(number, int) else None
         self.contacts += 1
-        if last is None or self._number is None or self._number == last + 1:
+        if last is None or heard.number is None or heard.number == last + 1:
             return []
-        missing = self._number - last - 1
+        missing = heard.number - last - 1
         if missing < 0:
             return ["back      out of order, or the sender restarted"]
         self.lost += missing

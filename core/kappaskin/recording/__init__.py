@@ -28,6 +28,8 @@ from kappaskin.recording.repair import Repaired as Repaired
 from kappaskin.recording.repair import RepairTask as RepairTask
 from kappaskin.recording.replay import Replay as Replay
 from kappaskin.recording.replay import ReplayedSource as ReplayedSource
+from kappaskin.recording.writing import HandPart as HandPart
+from kappaskin.recording.writing import HandRecorder as HandRecorder
 from kappaskin.recording.writing import RecordingStatus as RecordingStatus
 from kappaskin.recording.writing import part_of as part_of
 from kappaskin.recording.writing import renamed as renamed

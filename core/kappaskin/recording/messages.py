@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from kappaskin.errors import Refusal
 from kappaskin.recording.cdr import MessageType
+from kappaskin.sources import is_finger
 
 TIME = MessageType("builtin_interfaces/msg/Time", "int32 sec\nuint32 nanosec")
 HEADER = MessageType("std_msgs/msg/Header", "builtin_interfaces/Time stamp\nstring frame_id", TIME)
@@ -257,11 +258,25 @@ float64 second_size_sd            # m^2
 )
 
 
+_PREFIX = "/kappaskin/"
+
+
 class Topic(NamedTuple):
     """A channel of the file."""
 
     name: str
     kind: MessageType
+
+    def of(self, finger: str) -> "Topic":
+        """The same of one `finger` of a hand; itself for the finger without a name."""
+        name = f"{_PREFIX}{finger}/{self.name.removeprefix(_PREFIX)}"
+        return self._replace(name=name) if finger else self
+
+
+def finger_of(name: str) -> tuple[str, str]:
+    """The finger in the name of a channel, empty without one, and the name of its topic."""
+    finger, found, topic = name.removeprefix(_PREFIX).partition("/")
+    return (finger, _PREFIX + topic) if found and is_finger(finger) else ("", name)
 
 
 DEVICE = Topic("/kappaskin/device", STRING)
@@ -296,7 +311,7 @@ TOPICS = (
     POSES,
     SKIN,
 )
-"""Every channel of a recording."""
+"""Every channel of a recording, or of one of its fingers."""
 
 FRAME = "skin"
 """The coordinate frame of all messages that have one."""

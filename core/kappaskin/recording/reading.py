@@ -49,9 +49,10 @@ from kappaskin.recording.messages import (
     STRING,
     TOPICS,
     Topic,
+    finger_of,
     unpack_line,
 )
-from kappaskin.recording.writing import FORMAT, PROGRAM, part_of
+from kappaskin.recording.writing import FORMAT, HAND_FORMAT, PROGRAM, part_of
 
 MAGIC = b"\x89MCAP0\r\n"
 LARGEST = 2**26  # bytes of a record, or of what is in a chunk
@@ -223,10 +224,14 @@ class Recording:
     breaks off. `first` and `last` are the times it spans, in ns since 1970, `counts` how many
     messages each topic has, and `chunks` where they are. It was recorded by the program `library`,
     whose estimates have the `revision`; 0 if unknown, as of recordings before there were revisions.
+
+    Of a hand it is the recording of one `finger`, by default of the first of its `fingers`, whose
+    names are empty where there is one without a name. Times are the same for all fingers.
     """
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
+    def __init__(self, path: Path, finger: str | None = None) -> None:
+        self.path, self.finger, self._first_finger = path, finger or "", finger is None
+        self._fingers: dict[str, None] = {}
         try:
             self._file = open_file(path)
             self._size = self._file.seek(0, 2)
@@ -269,12 +274,19 @@ class Recording:
         except CorruptRecord as fault:
             raise Damaged(f"{self.path}: not a valid recording: {fault}") from fault
 
+    @property
+    def fingers(self) -> tuple[str, ...]:
+        return tuple(self._fingers)
+
     def _check_format(self) -> None:
-        if self.format > FORMAT:
+        if self.format > HAND_FORMAT:
             raise Refusal(
-                f"{self.path}: expected a recording of format {FORMAT}, got {self.format}, of a "
-                "later version; update this program"
+                f"{self.path}: expected a recording of format {HAND_FORMAT}, got {self.format}, of "
+                "a later version; update this program"
             )
+        if self._fingers and self.finger not in self._fingers:
+            names = ", ".join(self._fingers) or "which have no names"
+            raise Refusal(f"{self.path}: expected one of its fingers, {names}; got {self.finger!r}")
         if not self._topics and self.library.startswith("kappaskin"):
             raise Damaged(
                 f"{self.path}: expected messages, got none before the damaged part; `kappaskin "
@@ -353,9 +365,14 @@ class Recording:
             self._schemas[schema.id] = schema.name
         elif code == Opcode.CHANNEL:
             channel = parsed(Channel, body)
-            ours = _KINDS.get(channel.topic) == self._schemas.get(channel.schema_id)
-            if ours and channel.message_encoding == "cdr":
-                self._topics[channel.id] = channel.topic
+            finger, topic = finger_of(channel.topic)
+            kind = _KINDS.get(topic)
+            if (kind, channel.message_encoding) == (self._schemas.get(channel.schema_id), "cdr"):
+                if self._first_finger and not self._fingers:
+                    self.finger = finger
+                self._fingers[finger] = None
+                if finger == self.finger:
+                    self._topics[channel.id] = topic
 
     # Without a summary.
 
@@ -480,12 +497,14 @@ class Recording:
     @property
     def attachments(self) -> tuple[str, ...]:
         """The names of the files in it."""
-        return tuple(self._attached)
+        at = f"{self.finger}/" if self.finger else ""
+        return tuple(name.removeprefix(at) for name in self._attached if name.startswith(at))
 
     def attachment(self, name: str) -> bytes:
         """The file called `name`."""
         try:
-            record = record_at(self._file, self._attached[name], self._size)
+            full = f"{self.finger}/{name}" if self.finger else name
+            record = record_at(self._file, self._attached[full], self._size)
             if record.code != Opcode.ATTACHMENT:
                 raise CorruptRecord("its index is wrong")
             return parsed(Attachment, record.body).data

@@ -437,14 +437,14 @@ class Verification:
         return tuple(change.words for change in self.changes) if self.another else ()
 
     @staticmethod
-    def steps(path: Path) -> "Generator[float | Verification]":
-        """Recompute all results recorded in `path`, and compare.
+    def steps(path: Path, finger: str | None = None) -> "Generator[float | Verification]":
+        """Recompute all results recorded in `path`, of one `finger` of a hand, and compare.
 
         Yields the share that is done now and then, and the verdict at the end. To be run in one
         thread, as the engine is: several sum in another order. A `Refusal` where it is no
         recording.
         """
-        with Recording(path) as recording:
+        with Recording(path, finger) as recording:
             worker = _Worker(recording)
             span = max(recording.last - recording.first, 1)
             for n, message in enumerate(recording.messages()):

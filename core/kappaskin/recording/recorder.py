@@ -14,7 +14,7 @@ from kappaskin.pipeline import Pipeline, setup_to_text
 from kappaskin.recording import messages as m
 from kappaskin.recording.cdr import MessageLayout, encode
 from kappaskin.recording.disk import ReservedFile
-from kappaskin.recording.writing import RecordingFile, RecordingStatus
+from kappaskin.recording.writing import HandLine, HandPart, RecordingFile, RecordingStatus
 from kappaskin.scenes import Scene, write_scene
 from kappaskin.sources import ClockState
 
@@ -31,18 +31,20 @@ _COLUMNS = ("x", "y", "z", "displacement")
 class Recorder:
     """Writes the recording `path`: bytes and events of a source, and the results of its frames.
 
-    A `Refusal` where no file can be made. No call but `close` and `wait` waits for the disk. Times
-    are in s since `zero`, in ns since 1970; by default on the monotonic clock.
+    It may be the part of a finger in that of a hand. A `Refusal` where no file can be made. No call
+    but `close` and `wait` waits for the disk. Times are in s since `zero`, in ns since 1970; by
+    default on the monotonic clock.
     """
 
     def __init__(
         self,
-        path: Path,
+        path: Path | HandPart,
         now: float,
         disk: Callable[[Path], ReservedFile] = ReservedFile,
         zero: int | None = None,
     ) -> None:
-        self._file = RecordingFile(path, disk, zero)
+        hand = isinstance(path, HandPart)
+        self._file = HandLine(path) if hand else RecordingFile(path, disk, zero)
         self._now = now  # host time in s of what came last
         # The one recorded last, and its layout.
         self._truth, self._truths = _NO_TRUTH, _truths_like(_NO_TRUTH)

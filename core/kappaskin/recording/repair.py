@@ -132,12 +132,16 @@ class _Repair:
 
     def _begin(self) -> None:
         """Write the header of the original file."""
-        profile, library = "", "kappaskin"
+        profile, library, fingers = "", "kappaskin", ""
         self._at = len(MAGIC)
         if self._data[: len(MAGIC)] == MAGIC:
             try:
-                header = parsed(Header, record_at(self._data, len(MAGIC), self._size).body)
+                first = record_at(self._data, len(MAGIC), self._size)
+                header = parsed(Header, first.body)
                 profile, library = header.profile, header.library
+                then = record_at(self._data, first.end, self._size)
+                if then.code == Opcode.METADATA:
+                    fingers = parsed(Metadata, then.body).metadata.get("fingers", "")
             except CorruptRecord:
                 pass
         elif (found := self._next_chunk(0)) < self._size:
@@ -145,12 +149,13 @@ class _Repair:
         else:
             raise Refusal(f"{self._path}: expected a recording (an MCAP file), got another file")
         self._writer.start(profile, library)
-        self._expect(library)
+        self._expect(library, fingers.split(","))
 
-    def _expect(self, library: str) -> None:
+    def _expect(self, library: str, fingers: list[str]) -> None:
         """Add the channels of our recordings: the chunk that defines them may be damaged."""
         if library.startswith("kappaskin"):
-            for n, (topic, kind) in enumerate(TOPICS, 1):
+            topics = (topic.of(finger) for finger in fingers for topic in TOPICS)
+            for n, (topic, kind) in enumerate(topics, 1):
                 self._schemas[n] = Schema(n, kind.definition, "ros2msg", kind.name)
                 self._channels[n] = Channel(n, topic, "cdr", {}, n)
         try:

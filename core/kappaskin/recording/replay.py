@@ -109,9 +109,9 @@ class _Ready(NamedTuple):
 
 
 class ReplayedSource:
-    """Yields the frames of the recording at `path` when they are due.
+    """Yields the frames of the recording at `path` when they are due, of one `finger` of a hand.
 
-    Opening raises a `Refusal` where it is none.
+    Opening raises a `Refusal` where it is none, or has several fingers of which none is named.
     """
 
     SCHEME = "replay:"
@@ -122,9 +122,10 @@ class ReplayedSource:
         path: Path,
         clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
+        finger: str | None = None,
     ) -> None:
-        self._clock, self._sleep = clock, sleep
-        self._recording = Recording(path)
+        self._clock, self._sleep, self._finger = clock, sleep, finger
+        self._recording = Recording(path, finger)
         try:
             self._begin()
         except Refusal:
@@ -133,6 +134,11 @@ class ReplayedSource:
 
     def _begin(self) -> None:
         recording = self._recording
+        if self._finger is None and len(recording.fingers) > 1:
+            raise Refusal(
+                f"{recording.path}: has the fingers {', '.join(recording.fingers)}; play one, such "
+                f"as {self.SCHEME}{recording.path}#{recording.fingers[0]}"
+            )
         if not recording.counts.get(m.LINES.name):
             raise Refusal(
                 f"{recording.path}: expected a recording with bytes of a device, got none in it"
@@ -420,4 +426,12 @@ def _brief(event: Event) -> Event:
     return Event(event.time, event.kind[:_LONGEST], event.text[:_LONGEST])
 
 
-register_scheme(ReplayedSource.SCHEME, lambda name, _: ReplayedSource(Path(name)))
+def _opened(name: str, _: bool) -> ReplayedSource:
+    """The recording FILE, or one finger of it, as FILE#FINGER."""
+    file, found, finger = name.rpartition("#")
+    if found and not Path(name).exists():
+        return ReplayedSource(Path(file), finger=finger)
+    return ReplayedSource(Path(name))
+
+
+register_scheme(ReplayedSource.SCHEME, _opened)

@@ -16,6 +16,7 @@ from kappaskin.mechanics import Plate
 from kappaskin.skin import Cap, Disk, MeshSkin, Patch
 
 _POINTS = 12  # exact to rounding for waves as short as the gage
+_BESIDES, _PER_STEP = 2, 2  # points, and more for each step of splines: inexact by 0.001
 
 # A gage along the unit vector e reads the mean of the normal curvature e'Ke over its length L. One
 # lies along x and one along y. The twist is half of what two along the diagonals differ by, which
@@ -59,6 +60,11 @@ ValuesAlong = Callable[[Array, Array], Array]
 _X, _Y = _AXES = np.eye(2)
 
 
+def _across(t: Array) -> Array:
+    """The unit vectors (..., 2) that `t` (..., 2) become by a quarter of a turn from x to y."""
+    return np.stack([-t[..., 1], t[..., 0]], axis=-1)
+
+
 def _along(basis: Basis, positions: Array, L: float, curvature: ValuesAt, t: Array) -> Array:
     """Curvature (P, N) along the unit vectors t (2,) or (P, 2), the mean along gages of length L.
 
@@ -67,7 +73,7 @@ def _along(basis: Basis, positions: Array, L: float, curvature: ValuesAt, t: Arr
     """
     if not L:
         return _normal(curvature(positions), t)
-    if any(basis.patch.curvatures):
+    if isinstance(basis.patch, MeshSkin) or any(basis.patch.curvatures):
         return _over_gage(
             lambda places, ways: _normal(curvature(places), ways), basis.patch, positions, L, t
         )
@@ -99,7 +105,10 @@ def _slope(basis: Basis, places: Array, t: Array) -> Array:
 
 def _over_gage(values: ValuesAlong, patch: Patch, positions: Array, L: float, t: Array) -> Array:
     """The mean of `values` along gages of length L along t."""
-    along, weights = gauss(L, _POINTS)
+    points = _POINTS
+    if isinstance(patch, MeshSkin):  # whose functions are splines
+        points = _BESIDES + math.ceil(_PER_STEP * L / float(patch.splines.step.min()))
+    along, weights = gauss(L, points)
     steps = zip(along - L / 2, weights / L, strict=True)
     return np.sum([w * values(*patch.along(positions, t, s)) for s, w in steps], axis=0)
 
@@ -109,10 +118,13 @@ def _any_way(values: ValuesAt) -> ValuesAlong:
 
 
 def _over_cell(
-    values: ValuesAt, patch: Patch, positions: Array, cell: tuple[float, float]
+    values: ValuesAt, patch: Patch, positions: Array, cell: tuple[float, float], t: Array
 ) -> Array:
-    """The mean of `values` over rectangles of the sides `cell` in m; a side may be zero."""
-    for axis, side in zip((_X, _Y), cell, strict=True):
+    """The mean of `values` over rectangles of the sides `cell` in m, which may be zero.
+
+    The first of them is along `t` (2,) or (P, 2).
+    """
+    for axis, side in zip((t, _across(t)), cell, strict=True):
         if side:
             values = partial(_over_gage, _any_way(values), patch, L=side, t=axis)
     return values(positions)
@@ -307,6 +319,14 @@ class SensorLayout:
             return
         if not _SHORTEST <= L < math.inf:
             raise Refusal(f"expected a gage length of 0 m, or {_SHORTEST:g} m and more, got {L}")
+        if isinstance(self.patch, MeshSkin):
+            inside = self._has_gages(self.positions, self.turns)
+            if not inside.all():
+                raise Refusal(
+                    f"gages of {L:g} m go over the rim of the {self.patch.name} at element "
+                    f"{int(np.argmin(inside))}; use shorter ones"
+                )
+            return
         depth = self.patch.depth(self.positions)
         least = int(np.argmin(depth))
         if depth[least] * (1 + _ROUNDING) < L / 2:
@@ -324,7 +344,7 @@ class SensorLayout:
             return
         if not all(0 <= side < math.inf for side in self.cell):
             raise Refusal(f"expected two sides of a cell of at least 0 m, got {self.cell}")
-        inside = self.has_room(self.positions)
+        inside = self._has_cells(self.positions, self.turns)
         if not inside.all():
             raise Refusal(
                 f"cells of {self.cell[0]:g} x {self.cell[1]:g} m go over the rim of the "
@@ -476,11 +496,33 @@ class SensorLayout:
 
     def has_room(self, positions: Array) -> Mask:
         """At which `positions` (C, 2) in m the gages and cells of an element are on the skin."""
+        if isinstance(self.patch, MeshSkin):
+            on = self._has_gages(positions)
+        else:
+            on = self.patch.depth(positions) * (1 + _ROUNDING) >= self.gage_length / 2
+        return on & self._has_cells(positions)
+
+    def _has_gages(self, positions: Array, turns: Array | None = None) -> Mask:
+        """At which `positions` (C, 2) in m both ends of all gages along the skin are on it."""
+        on, far = np.ones(len(positions), bool), self.gage_length / 2 * (1 - _ROUNDING)
+        diagonal = np.pi / 4
+        along = {t for name, t in self.kinds if name in _ALONG}
+        along |= {diagonal, -diagonal} if "twist" in dict(self.kinds) else set()
+        for t in along if far else ():
+            ways = _unit(t if turns is None else t + turns)
+            for end in (-far, far):
+                on &= self.patch.contains(self.patch.along(positions, ways, end)[0])
+        return on
+
+    def _has_cells(self, positions: Array, turns: Array | None = None) -> Mask:
+        """At which `positions` (C, 2) in m the corners of cells along the skin are on it."""
         half = np.array(self.cell) / 2 * (1 - _ROUNDING)
         on, far = np.ones(len(positions), bool), math.hypot(*half)
-        for side in half * [[1, 1], [1, -1], [-1, 1], [-1, -1]] if far else ():
-            on &= self.patch.contains(self.patch.along(positions, side / far, far)[0])
-        return on & (self.patch.depth(positions) * (1 + _ROUNDING) >= self.gage_length / 2)
+        for x, y in half * [[1, 1], [1, -1], [-1, 1], [-1, -1]] if far else ():
+            way = math.atan2(y, x)
+            ways = _unit(way if turns is None else way + turns)
+            on &= self.patch.contains(self.patch.along(positions, ways, far)[0])
+        return on
 
     def reading_at(self, positions: ArrayLike, which: Indices) -> "SensorLayout":
         """Elements at other `positions` (C, 2) in m, each with the readings `which` (k,) of these.
@@ -709,10 +751,15 @@ class SensorLayout:
         return rows if self.scale is None else self.scale[:, None] * rows
 
     def mean_curvature(self, basis: Basis, curvature: ValuesAt) -> Array:
-        """Means over the gages (3 P, N) of the `curvature` (3, P, N) at positions (P, 2)."""
+        """Means over the gages (3 P, N) of the `curvature` (3, P, N) at positions (P, 2).
+
+        Of elements that are turned, along their axes alone (P, N).
+        """
+        along = partial(_along, basis, self.positions, self.gage_length, curvature)
+        if (turns := self.turns) is not None:
+            return along(_unit(turns))
         if not self.gage_length:
             return np.concatenate(curvature(self.positions))
-        along = partial(_along, basis, self.positions, self.gage_length, curvature)
         return np.concatenate([along(_X), along(_Y), _twist(along)])
 
     def _read_by(
@@ -723,6 +770,7 @@ class SensorLayout:
         for name in dict.fromkeys(name for name, _ in self.kinds):
             own = np.flatnonzero(reads.quantity == name)
             at, t = self.positions[reads.element[own]], reads.along[own]
+            axis = _X if reads.turn is None else _unit(reads.turn[own])
 
             def slope(places: Array, t: Array = t) -> Array:
                 found = _slope(basis, places, t)
@@ -732,9 +780,9 @@ class SensorLayout:
                 return found
 
             if name == "height":
-                M[own] = _over_cell(basis.at, self.patch, at, self.cell)
+                M[own] = _over_cell(basis.at, self.patch, at, self.cell, axis)
             elif name == "slope" and not L:
-                M[own] = _over_cell(slope, self.patch, at, self.cell)
+                M[own] = _over_cell(slope, self.patch, at, self.cell, axis)
             elif name == "slope" and H:
                 M[own] = _over_gage(_any_way(slope), self.patch, at, L, t)
             elif name == "slope":

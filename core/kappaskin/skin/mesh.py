@@ -10,7 +10,7 @@ from functools import cached_property, lru_cache
 from typing import Any, cast
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from kappaskin._files import ARCHIVE_DAMAGES
 from kappaskin.errors import Refusal
@@ -106,10 +106,10 @@ class Splines:
         first, rows = self.at(x, y)
         return rows[:orders].dot(self.block(coefficients, *first))
 
-    def block(self, coefficients: Array, i: int, j: int) -> Array:
+    def block(self, coefficients: NDArray[Any], i: int, j: int) -> Array:
         """Those (16, k) of coefficients (G, k) of which `at` gives the weights."""
         found = coefficients.reshape(self._count[1], self._count[0], -1)[j : j + 4, i : i + 4]
-        return found.reshape(16, -1)
+        return found.reshape(16, -1).astype(float, copy=False)
 
     def _weights_at(self, x: float, y: float) -> tuple[tuple[int, int], Array]:
         """The first coefficients each way around a place, and weights (6, 16) of those."""
@@ -179,7 +179,8 @@ class MeshSkin(Polygon):
         held: ArrayLike | None = None,
     ) -> None:
         # As exact as most files have them, which halves what a recording needs.
-        given = np.array(nodes, np.float32).astype(float)
+        with np.errstate(invalid="ignore", over="ignore"):  # what is not finite is refused below
+            given = np.array(nodes, np.float32).astype(float)
         faces = np.array(triangles, np.intp)
         _check_mesh(given, faces, thickness)
         (rim,) = MeshSurface(given, faces).loops
@@ -261,8 +262,18 @@ class MeshSkin(Polygon):
         return not np.array_equal(self.places, self.points[:, :2])
 
     @property
+    def is_held_in_part(self) -> bool:
+        """Whether a part of the rim is free."""
+        return len(self.held) < len(self.rim)
+
+    @property
     def arc_curvature(self) -> float:
         return 0.0
+
+    @property
+    def most_functions(self) -> int:
+        """How many functions it has nodes for."""
+        return len(self.points) // 4  # two loads for each, of two nodes each
 
     @cached_property
     def areas(self) -> Array:
@@ -335,6 +346,11 @@ class MeshSkin(Polygon):
         each = [self.splines.design(positions, *order) @ self._surface for order in _ORDERS]
         return np.stack(each)
 
+    @property
+    def most_functions(self) -> int:
+        """How many functions it has nodes for."""
+        return len(self.points) // 4  # two loads for each, of two nodes each
+
     def jet(self, x: float, y: float) -> Array:
         """Derivatives (6, 3) of the point in space at one place in m, as of splines."""
         return self.splines.jet(self._surface, x, y)
@@ -400,11 +416,12 @@ _GEODESIC = 2
 def _base(jet: Any) -> Base:
     """`Base` of derivatives (6, 3, ...) of the points in space."""
     r, r_x, r_y, *seconds = jet
-    E, t = _dot(r_x, r_x), _dot(r_x, r_y)
-    t = t / E
-    across = tuple(v - t * u for u, v in zip(r_x, r_y, strict=True))
-    a, d = 1 / E**0.5, 1 / _dot(across, across) ** 0.5
-    e_x, e_y = tuple(a * u for u in r_x), tuple(d * u for u in across)
+    (ux, uy, uz), (vx, vy, vz) = r_x, r_y
+    E = ux * ux + uy * uy + uz * uz
+    t = (ux * vx + uy * vy + uz * vz) / E
+    vx, vy, vz = vx - t * ux, vy - t * uy, vz - t * uz
+    a, d = 1 / E**0.5, 1 / (vx * vx + vy * vy + vz * vz) ** 0.5
+    e_x, e_y = (a * ux, a * uy, a * uz), (d * vx, d * vy, d * vz)
     n = (
         e_x[1] * e_y[2] - e_x[2] * e_y[1],
         e_x[2] * e_y[0] - e_x[0] * e_y[2],
@@ -425,7 +442,8 @@ def _base(jet: Any) -> Base:
 
 
 def _dot(u: Any, v: Any) -> Number:
-    return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
+    (a, b, c), (x, y, z) = u, v
+    return a * x + b * y + c * z
 
 
 def _sums(places: Indices, values: Array, count: int) -> Array:
@@ -434,7 +452,7 @@ def _sums(places: Indices, values: Array, count: int) -> Array:
 
 
 def _check_mesh(nodes: Array, triangles: Indices, thickness: float) -> None:
-    if nodes.ndim != 2 or nodes.shape[1] != 3 or not np.isfinite(nodes).all():
+    if nodes.ndim != 2 or nodes.shape[1] != 3 or not (len(nodes) and np.isfinite(nodes).all()):
         raise Refusal(f"expected finite nodes of shape (n, 3) in m, got shape {nodes.shape}")
     if not (SIDES[0] <= np.ptp(nodes, axis=0).max() <= SIDES[1]):
         raise Refusal(f"expected nodes of a skin in m, got {np.ptp(nodes, axis=0)} m of them")

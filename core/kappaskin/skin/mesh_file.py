@@ -243,10 +243,12 @@ def _read_stl(content: bytes) -> _Mesh:
         if len(corners) % 3 or not re.search(rb"\bendsolid\b", content[-1000:], re.IGNORECASE):
             raise Refusal("expected `endsolid` after whole triangles, got an STL text that is cut")
     else:
+        announced = f" where {count} triangles are announced" if len(content) >= 84 else ""
+        is_text = len(content) > 0 and content.isascii()
+        found = f"another text, {content[:20].decode()!r}" if is_text else ""
         raise Refusal(
             "expected an STL text that begins with `solid`, or 84 bytes and 50 for each triangle, "
-            f"got {len(content)} bytes"
-            + (f" where {count} triangles are announced" if len(content) >= 84 else "")
+            f"got {found or f'{len(content)} bytes{announced}'}"
         )
     soup = MeshSurface(corners, np.arange(len(corners)).reshape(-1, 3))
     merged = _joined(soup, _equal(corners))
@@ -867,7 +869,7 @@ def held_edges(surface: MeshSurface, held: ArrayLike) -> Indices:
         far = arcs.reshape(-1, 3)[away.argmax()]
         raise Refusal(
             f"expected ends of the held edge on the rim, got {far} m, which is "
-            f"{1e3 * away.max():.3g} mm away; the unit is m"
+            f"{1e3 * away.max():.3g} mm away; give points of the rim in the unit of the mesh"
         )
     sides: list[Indices] = []
     for begin, end in nodes[near]:

@@ -42,6 +42,8 @@ from kappaskin.sources.simulated import SimulatedSource as SimulatedSource
 from kappaskin.sources.simulated import VirtualClock as VirtualClock
 from kappaskin.sources.source import InputRecorder as InputRecorder
 from kappaskin.sources.source import Source as Source
+from kappaskin.sources.source import is_finger as is_finger
+from kappaskin.sources.source import named_sources as named_sources
 from kappaskin.sources.source import open_source as open_source
 from kappaskin.sources.source import plugged_source as plugged_source
 from kappaskin.sources.source import register_scheme as register_scheme

@@ -1,6 +1,7 @@
 """Interface of sources, their recorders, and opening by name."""
 
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Protocol
@@ -84,6 +85,35 @@ class Source(Protocol):
         ...
 
     def close(self) -> None: ...
+
+
+_FINGER = re.compile(r"[A-Za-z]\w{0,31}", re.ASCII)  # as a part of a topic in ROS 2
+
+
+def is_finger(name: str) -> bool:
+    """Whether a finger may have this name: a letter, then letters, digits and _, 32 at most."""
+    return _FINGER.fullmatch(name) is not None
+
+
+def named_sources(texts: Sequence[str]) -> dict[str, str]:
+    """The source of each finger by its name, of texts NAME=SOURCE.
+
+    One alone may be without a name, which is empty then. A source may have an = of its own: it has
+    a name only where that may be one. Raises a `Refusal` for a name that is missing or given twice.
+    """
+    found: dict[str, str] = {}
+    for text in texts:
+        name, named, source = text.partition("=")
+        name, source = (name, source) if named and is_finger(name) else ("", text)
+        if not name and len(texts) > 1:
+            raise Refusal(
+                f"expected a name for each of several sources, such as thumb={text}, got {text}; "
+                "a name is a letter, then letters, digits and _"
+            )
+        if name in found:
+            raise Refusal(f"expected one source for the finger {name}, got two; change a name")
+        found[name] = source
+    return found
 
 
 _schemes: dict[str, Callable[[str, bool], Source]] = {}

@@ -4,11 +4,11 @@ from dataclasses import replace
 import pytest
 from PySide6.QtWidgets import QApplication
 
-from kappaskin import Status, load_scene
+from kappaskin import Setup, Status, load_scene
 from kappaskin.health import Health
 from kappaskin.health.findings import Finding
 from kappaskin.recording import RecordingStatus, Replay
-from kappaskin_app.shell.badge import Badge, colour_of, origin, state_of
+from kappaskin_app.shell.badge import Badge, colour_of, functions_of, in_use, origin, state_of
 from kappaskin_app.theme import LIGHT
 
 NOW = 100.0
@@ -78,3 +78,11 @@ def test_the_badge_says_recording_below_what_nothing_graver_is_true_of(qapp: QAp
     assert badge.accessibleName() == "SIM, paused, recording"
     badge.show_state("SIM", RecordingStatus())
     assert badge.text() == "SIM"
+
+
+def test_a_mesh_has_a_number_of_functions_and_none_in_x_and_y() -> None:
+    pad, setup = load_scene("thumb-pad").sensor(), Setup(Ni=7, Nj=8)
+    assert functions_of(setup, SENSOR) == functions_of(setup, None) == "7 x 8"
+    assert functions_of(setup, pad) == "56"
+    refused = Status(setup=setup, sensor=pad, refusal="no", slot=1)
+    assert in_use(refused).startswith("In use: Least squares, 56 functions. ")

@@ -14,10 +14,12 @@ from kappaskin_app.features.heatmaps.heatmap import Heatmap
 from kappaskin_app.features.membrane.surface import ElementCells
 from kappaskin_app.shell.colouring import HEALTH, HEALTH_COLOURS, SHADES, Ranges
 from kappaskin_app.shell.form import SeveralButton
+from kappaskin_app.shell.selection import SkinMap
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.settings.shown import COLOURS
 from kappaskin_app.shell.window import MainWindow
 from kappaskin_app.theme import SATURATED
+from kappaskin_app.widgets.tint import Tint
 
 ALL = tuple(name for name, _ in COLOURS)
 
@@ -170,7 +172,8 @@ def test_all_ranges_are_locked_in_one_step_and_freed_in_another(window: MainWind
 @pytest.mark.full
 def test_only_ranges_that_are_seen_are_locked(window: MainWindow, until) -> None:
     window.docks["curvature"].hide()
-    window.selection.show_mode(np.zeros(window.session.estimate.surface.shape), "A shape")
+    values, tint = np.zeros(window.session.estimate.surface.shape), Tint("diverging", (-1, 1), "")
+    window.selection.show_map(SkinMap(values, tint, "A shape"))
     until(lambda: window.scale.bar.limits == (-1.0, 1.0))
     lock = window.actions_by_name["lock-ranges"]
 
@@ -178,7 +181,7 @@ def test_only_ranges_that_are_seen_are_locked(window: MainWindow, until) -> None
 
     settings = window.history.settings
     assert [settings.range_displacement, settings.range_xx, settings.range_yy] == [0, 0, 0]
-    window.selection.show_mode(None)
+    window.selection.show_map(None)
     until(lambda: window.scale.bar.limits != (-1.0, 1.0))
     lock.trigger()
     assert window.history.settings.range_displacement == pytest.approx(5e-3)

@@ -3,6 +3,8 @@
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 
@@ -94,7 +96,7 @@ class Trusted:
 
 def test_settings_are_stored_once_each_and_only_while_it_records(qapp) -> None:
     history, engine = History(Settings()), Trusted()
-    handover = SettingsHandover(history, engine)
+    handover = SettingsHandover(history, cast(Any, SimpleNamespace(engine=engine)))
     recording = Status(recording=RecordingStatus("x.mcap", active=True))
     handover.follow(Status())
     assert engine.data == []

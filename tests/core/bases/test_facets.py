@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from kappaskin.bases.facets import Facets, Factored, held_freedoms
+from kappaskin.bases.mesh import along_normals, factored, pressed
 from kappaskin.errors import Refusal
+from kappaskin.skin import MeshSkin
 
 D, C, NU = 2.0, 300.0, 0.3
 LAW = np.array([[1, NU, 0], [NU, 1, 0], [0, 0, (1 - NU) / 2]])
@@ -222,3 +224,24 @@ def test_a_node_without_a_triangle_is_refused_by_number():
     nodes, triangles, _ = grid(3, 3)
     with pytest.raises(Refusal, match=r"1 that are at none.*number 16"):
         Facets(np.vstack([nodes, [[5.0, 5, 5]]]), triangles)
+
+
+def _gives(count, edge):
+    """Of a square plate held along a side and half of another, of `count` nodes each way."""
+    line, number = np.linspace(0, 0.02, count), np.arange(count**2).reshape(count, count)
+    x, y = (each.ravel() for each in np.meshgrid(line, line))
+    below, above = number[:-1], number[1:]
+    a, b, c, d = (
+        each.ravel() for each in (below[:, :-1], below[:, 1:], above[:, 1:], above[:, :-1])
+    )
+    triangles = np.concatenate([np.stack([a, b, c], -1), np.stack([a, c, d], -1)])
+    nodes, held = np.column_stack([x, y, 0 * x]), number[0, : (count + 1) // 2]
+    mesh = MeshSkin(nodes, triangles, 1e-3, np.append(held, number[-1]))
+    force = np.exp(-np.sum((mesh.places - [0.014, 0.006]) ** 2, 1) / (2 * 0.002**2)) * mesh.areas
+    moved = factored(mesh, edge, 1e-3**2 / 12, 0.3)(pressed(mesh, force[:, None]))
+    return along_normals(mesh, moved)[:, 0] @ force / force.sum() ** 2
+
+
+@pytest.mark.parametrize("edge", ["clamped", "hinged"])
+def test_where_a_held_part_of_a_rim_ends_coarse_triangles_give_as_fine_ones(edge):
+    assert _gives(21, edge) == pytest.approx(_gives(61, edge), rel=0.01)

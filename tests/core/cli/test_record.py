@@ -218,3 +218,66 @@ def test_the_seconds_begin_once_frames_are_computed() -> None:
     with ProgressLine() as show_progress:
         _recorded(StuckEngine(0.5), 0.2, [], show_progress)  # type: ignore[arg-type]
     assert 0.6 <= time.monotonic() - began < 5.0
+
+
+# A hand.
+
+
+@pytest.fixture(scope="module")
+def hand(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A thumb and an index; the port of a ring finger is not there."""
+    path = tmp_path_factory.mktemp("hand") / "hand.mcap"
+    command = [sys.executable, "-m", "kappaskin", "record", str(path), "--seconds", "3"]
+    for finger, source in (("thumb", "sim:circle"), ("ring", "/dev/none"), ("index", "sim:circle")):
+        command += ["--source", f"{finger}={source}"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 1
+    assert "kappaskin: ring: /dev/none: there is no such port" in done.stderr
+    assert f"{path}: " in done.stdout
+    assert re.search(r"^  ring: 0 of 0 messages lost$", done.stdout, re.MULTILINE)
+    return path
+
+
+def test_a_hand_is_recorded_but_for_the_finger_that_is_lost(hand, capsys) -> None:
+    assert main(["info", str(hand), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)["fingers"]
+    assert list(told) == ["thumb", "ring", "index"]
+    assert [len(told[finger]["devices"]) for finger in told] == [1, 0, 1]
+    assert main(["info", str(hand)]) == 0
+    assert f"{hand} (index): " in capsys.readouterr().out
+
+
+def test_each_finger_is_verified(hand, capsys) -> None:
+    assert main(["verify", str(hand)]) == 1  # there is nothing of the ring finger
+    thumb, ring, index = capsys.readouterr().out.splitlines()
+    assert thumb.startswith(f"{hand} (thumb): ")
+    assert ring.endswith("nothing to compare")
+    assert all(line.endswith("the same bit for bit") for line in (thumb, index))
+
+
+def test_each_finger_is_exported_or_the_one_that_is_named(hand, tmp_path, capsys) -> None:
+    out = tmp_path / "press.csv"
+    assert main(["export", str(hand), "--to", str(out), "--finger", "index"]) == 0
+    assert '# finger: "index"' in out.read_text("utf-8")
+    assert main(["export", str(hand), "--to", str(out)]) == 1  # of the ring finger there is none
+    assert "kappaskin: ring: " in capsys.readouterr().err
+    assert sorted(os.listdir(tmp_path)) == ["press-index.csv", "press-thumb.csv", "press.csv"]
+    assert (tmp_path / "press-index.csv").read_bytes() == out.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "why"),
+    [
+        (["--source", "a=sim:", "--source", "a=sim:"], "one source for the finger a, got two"),
+        (["--source", "a=sim:", "--source", "sim:"], "a name for each of several sources"),
+        (["sim:", "--source", "a=sim:", "--out", "a.mcap"], "NAME=SOURCE .* got both"),
+        (["--out", "a.mcap"], "expected a source such as sim:.* got none"),
+        (["--source", "a=replay:x.mcap"], "expected a live source to record"),
+    ],
+)
+def test_a_hand_that_is_none_is_refused(arguments, why, tmp_path, monkeypatch, capsys) -> None:
+    monkeypatch.chdir(tmp_path)
+    by_place = [] if "--out" in arguments else ["hand.mcap"]
+    assert main(["record", *by_place, *arguments]) == 2
+    assert re.search(why, capsys.readouterr().err)
+    assert os.listdir(tmp_path) == []

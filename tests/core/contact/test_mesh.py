@@ -1,6 +1,7 @@
 """Contacts on meshes of caps: against the theory of shells of revolution, which has no elements."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -126,3 +127,37 @@ def test_a_skin_too_thin_for_its_triangles_is_refused():
     plate = Plate.of_material(mesh, 1e6, 0.3, 2e-5)
     with pytest.raises(Refusal, match="too thin for its radii"):
         influence_of(plate, layout, "hinged", 15, np.zeros((4, 60)))
+
+
+def test_heights_on_a_mesh_are_followed_by_as_many_functions_as_it_has_nodes_for():
+    mesh = MeshSkin(*ellipsoid(16, (R, R, R), math.radians(60)), H)
+    plate, out = Plate.of_material(mesh, 1e6, 0.3, H), np.zeros((4, 20))
+    layout = SensorLayout.spread(mesh, 20).reading_each(["height"])
+
+    influence = influence_of(plate, layout, "clamped", 15, out)
+    x, y = layout.positions[3].tolist()
+    influence.at(x, y, 1e-6)
+
+    assert out[0].argmax() == 3
+    assert out[0, 3] == pytest.approx(influence.gives(x, y) * influence.unit, rel=0.3)
+
+
+def test_readings_along_gages_are_those_of_gages_along_x_and_y():
+    mesh = MeshSkin(*ellipsoid(16, (R, R, R), math.radians(60)), H)
+    plate = Plate.of_material(mesh, 1e6, 0.3, H)
+    inside = np.linalg.norm(mesh.places - mesh.places[0], axis=1) < 0.6 * R
+    plain = SensorLayout.scattered(mesh, mesh.places[inside][::12])
+    plain = replace(plain, gage_length=1e-3)
+    named = plain.reading_each(["twist", "curvature@0", "curvature@90"])
+    found = []
+    for layout in (plain, named):
+        out = np.zeros((4, layout.channels))
+        influence_of(plate, layout, "clamped", 15, out).at(mesh.a * 0.6, mesh.b * 0.45, 1e-6)
+        found.append(layout.by_kind(out))
+    xx, yy, xy = np.moveaxis(found[0].reshape(4, 3, -1), 1, 0)
+    by_name = dict(zip(named.kind_names, np.moveaxis(found[1], 1, 0), strict=True))
+
+    for name, expected in {"curvature@0": xx, "curvature@90": yy, "twist": xy}.items():
+        assert np.allclose(
+            by_name[name], expected, atol=2e-4 * np.abs(expected).max(axis=-1)[:, None]
+        )

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kappaskin import LeastSquares, Patch, Refusal, SensorLayout, SineBasis, predicted_sd
-from kappaskin.estimation import place_elements
+from kappaskin.estimation import place_elements, place_for_loads
 
 PATCH = Patch(0.1, 0.08)
 BASIS = SineBasis(PATCH, 4, 3)
@@ -102,3 +102,48 @@ def test_what_is_predicted_is_the_spread_of_many_draws():
 def test_too_few_or_too_many_places_are_refused(apart):
     with pytest.raises(Refusal, match="expected a spacing that leaves more than 16 places"):
         place_elements(GRID, BASIS, "D", apart)
+
+
+def told_of(places):
+    """Of loads on a grid: each element tells more the nearer it is, and which way it lies."""
+    x, y = PATCH.grid(9, 7)
+    loads = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    away = (loads - places[:, None]) / 0.03
+    near = np.exp(-np.sum(away**2, axis=-1))
+    rows = np.concatenate([near[..., None], near[..., None] * away], axis=-1)
+    errors = np.zeros((2, len(loads), 3, 3))
+    errors[0, :, 0, 0] = errors[1, :, 1, 1] = errors[1, :, 2, 2] = 1.0
+    return rows[..., None] * rows[..., None, :], 1e-3 * np.eye(3), errors
+
+
+def error_of_loads(places):
+    information, known, errors = told_of(places)
+    V = np.linalg.inv(known + information.sum(axis=0))
+    return np.sum(errors * V, axis=(1, 2, 3))
+
+
+def test_elements_placed_for_loads_make_all_their_errors_smaller():
+    placed = place_for_loads(GRID, APART, told_of).positions
+
+    away = np.hypot(*(placed[:, None] - placed).T)
+    assert away[~np.eye(len(GRID), dtype=bool)].min() > APART - 1e-12
+    assert (error_of_loads(placed) < 0.9 * error_of_loads(GRID.positions)).all()
+
+
+def test_elements_stay_where_no_exchange_gains():
+    best = place_for_loads(GRID, APART, told_of)
+
+    assert place_for_loads(best, APART, told_of) is best
+
+
+def test_no_exchange_of_one_element_makes_loads_better_determined():
+    free = SensorLayout.regular(PATCH, 10, 8).positions
+    placed = place_for_loads(GRID, APART, told_of).positions
+    scale = error_of_loads(GRID.positions)
+
+    def bad(places):
+        return np.sum(error_of_loads(places) / scale)
+
+    others = [np.delete(placed, n, axis=0) for n in range(len(placed))]
+    least = min(bad(np.vstack([rest, place])) for rest in others for place in free)
+    assert least > bad(placed) * (1 - 1e-3)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from kappaskin import (
+    DiscLoad,
     Frame,
     GaussianLoad,
     Patch,
@@ -20,6 +21,7 @@ from kappaskin import (
     Stimulus,
     load_scene,
 )
+from kappaskin.bases import basis_for
 from kappaskin.estimation import FAULTS, Scanner
 from kappaskin.health import HealthMonitor
 from kappaskin.health.inconsistency import StatisticsWindow
@@ -466,6 +468,60 @@ def test_a_frame_that_others_overtook_changes_nothing_that_is_found() -> None:
     monitor(frames[-2])
 
     np.testing.assert_array_equal(monitor.kinds, found)
+
+
+PAD = load_scene("thumb-pad")
+PLACES = ((9.0, 7.0), (12.0, 4.5), (6.0, 9.5), (12.5, 9.0), (5.0, 5.0))  # mm
+
+
+@cache
+def pad_frames(seed):
+    """Frames of the thumb's pad, on which discs press one after the other for two seconds each."""
+    rng, basis, frames = np.random.default_rng(seed), basis_for(PAD.plate.patch, PAD.edge, 8, 8), []
+    M = PAD.layout.operator(basis, PAD.plate)
+    for x, y in PLACES:
+        K = M @ PAD.plate.deflection([DiscLoad(1e-3 * x, 1e-3 * y, 2e-3)], basis).ravel()
+        K *= 12 / np.abs(K).max()
+        for n in range(256):
+            time, share = len(frames) / 128, min(n / 64, (255 - n) / 64, 1.0)
+            read = share * K + rng.normal(0, 0.1, len(K))
+            counts = np.rint(read / PAD.transduction.resolution).astype(np.int32)
+            frames.append(Frame(0, time, time, np.arange(len(K)), counts))
+    return frames
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_no_healthy_element_of_a_mesh_held_along_part_of_its_rim_is_accused(seed) -> None:
+    _, looks = watched(pad_frames(seed), None, PAD.sensor())
+
+    assert not any(kinds.any() for _, kinds in looks)
+    assert len(looks) >= 35
+
+
+def drift(channel, rate):
+    def spoil(counts, time):
+        counts[channel] += int(rate * time / PAD.transduction.resolution)
+
+    return spoil
+
+
+@pytest.mark.parametrize(
+    ("spoil", "kind", "elements"),
+    [
+        (hold([0, 120, 240], 0.0), "dead", {0}),
+        (hold([0, 120, 240], 2.0), "stuck", {0}),
+        (drift(24, 1.0), "drifting", {24}),
+        (swap([0, 120, 240], [35, 155, 275]), "swapped", {0, 35}),
+    ],
+    ids=["dead", "stuck", "drifting", "swapped"],
+)
+def test_a_fault_of_an_element_on_a_mesh_is_found_alone(spoil, kind, elements) -> None:
+    monitor, _ = watched(pad_frames(0), spoil, PAD.sensor())
+
+    found = told(monitor)
+
+    assert {c % 120 for c in found} == elements
+    assert set(found.values()) == {kind}
 
 
 def test_one_element_or_two_are_watched_without_neighbours_to_ask() -> None:

@@ -4,6 +4,7 @@ import gc
 import os
 import threading
 import time
+from collections import Counter
 from contextlib import contextmanager
 from itertools import count, islice, pairwise
 from types import SimpleNamespace
@@ -11,7 +12,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from kappaskin import Refusal, Setup, SourceError, Status, feed, stream
+from kappaskin import Frame, Refusal, Setup, SourceError, Status, feed, stream
 from kappaskin.cli import main
 from kappaskin.cli.common import UsedTare
 from kappaskin.recording import Recording
@@ -213,3 +214,43 @@ def test_the_saved_tare_is_used_by_a_loop_and_by_publishing(board) -> None:
     assert np.sqrt(np.mean(untared**2)) > 5e-6
     assert np.sqrt(np.mean(tared**2)) < 1e-6
     assert [each.tare is not None for each in used] == [True]
+
+
+# A hand.
+
+
+def test_the_estimates_of_all_fingers_come_each_with_its_name() -> None:
+    seen = Counter[str]()
+    with stream({"thumb": "sim:circle", "index": "sim:circle"}) as hand:
+        for finger, estimate in hand:
+            assert abs(time.monotonic() - estimate.taken) < 5.0  # on one clock
+            seen[finger] += 1
+            if min(seen["thumb"], seen["index"]) >= 3:
+                break
+    assert set(seen) == {"thumb", "index"}
+
+
+def test_a_finger_that_fails_leaves_the_others_alone(monkeypatch) -> None:
+    hand = stream({"thumb": "sim:circle", "index": "sim:circle"})
+
+    def lost(timeout: float) -> list[Frame]:
+        raise SourceError("it was unplugged")
+
+    monkeypatch.setattr(hand.streams["index"]._source, "read", lost)  # noqa: SLF001
+    with hand:
+        finger, _ = next(iter(hand))
+        assert finger == "thumb"
+        assert str(hand.failures["index"]) == "it was unplugged"
+
+
+def test_where_all_fingers_fail_the_first_failure_is_raised(monkeypatch) -> None:
+    hand = stream({"thumb": "sim:circle"})
+    monkeypatch.setattr(
+        hand.streams["thumb"]._source,  # noqa: SLF001
+        "read",
+        lambda _: (_ for _ in ()).throw(SourceError("it was unplugged")),
+    )
+    with hand, pytest.raises(SourceError, match="unplugged"):
+        next(iter(hand))
+    with pytest.raises(SourceError):  # what was opened is closed again
+        stream({"thumb": "sim:circle", "index": "/dev/none-there"})

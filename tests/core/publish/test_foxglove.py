@@ -9,8 +9,9 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack, closing, suppress
 from copy import copy
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -169,6 +170,17 @@ def test_a_client_is_told_who_serves_and_what_there_is(client, protocol: str) ->
         assert mesh or json.loads(channel["schema"])["type"] == "object"
 
 
+def test_the_topics_of_a_finger_begin_with_its_name() -> None:
+    target = replace(target_of(f"foxglove://:{free_port()}"), finger="thumb")
+    with closing(foxglove.opened(target)) as server:
+        url = "ws://{}:{}".format(*place(server))
+        with connect(url, subprotocols=[PROTOCOLS[0]], compression=None) as one:
+            _, advertised = (json.loads(one.recv(PATIENCE)) for _ in range(2))
+    assert [each["topic"] for each in advertised["channels"]] == [
+        f"/thumb{topic}" for topic in TOPICS
+    ]
+
+
 def test_a_client_of_another_protocol_is_refused(server) -> None:
     url = "ws://{}:{}".format(*place(server))
     for protocols in (None, ["chat"]):
@@ -308,7 +320,7 @@ def test_the_mesh_is_one_piece_of_the_skin_seen_from_outside(kind: str) -> None:
     )
     data = SkinMessages()(MESH, message)
     assert data is not None
-    entity = decoded(MESH.advertised, data)
+    entity = decoded(MESH.advertised(""), data)
     assert (entity.timestamp.sec, entity.timestamp.nanosec) == (12, 500_000_000)
     assert not entity.lines
     points, triangles, colours = surface_of(entity)

@@ -317,3 +317,33 @@ def test_a_force_that_is_unknown_is_null_beside_the_place(messages_of) -> None:
     assert isinstance(told["x_m"], float)
     assert isinstance(told["displacement_m"], float)
     assert "nan" not in made.contact.decode().lower()
+
+
+# A hand.
+
+
+def test_every_message_of_a_finger_names_it(messages_of) -> None:
+    (made,) = messages_of(PRESSED)
+    named = message.EstimateMessage(
+        made.estimate, made.fit, made.pipeline, replace(made.mark, finger="thumb")
+    )
+    state = SourceState("streaming", "sim", "", None, 500.0, 0.0)
+    for with_name, without in (
+        (named.contact, made.contact),
+        (named.shape, made.shape),
+        (replace(state, finger="thumb").encoded(), state.encoded()),
+    ):
+        told = read(with_name)
+        assert told.pop("finger") == "thumb"
+        assert set(told) == set(read(without))
+        assert b"finger" not in without
+    assert len(named.contact) < LARGEST
+    assert "`finger`" in GUIDE
+
+
+def test_each_finger_has_a_server_of_its_own_and_one_receiver() -> None:
+    names = ["udp://127.0.0.1:9870", "foxglove://"]
+    assert target.of_finger(names, 0) == ["udp://127.0.0.1:9870", "foxglove://127.0.0.1:8765"]
+    assert target.of_finger(names, 2) == ["udp://127.0.0.1:9870", "foxglove://127.0.0.1:8767"]
+    with pytest.raises(target.Refusal, match="a port from 1 to 65535"):
+        target.of_finger(["foxglove://:65535"], 1)

@@ -6,6 +6,7 @@ import os
 import socket
 import threading
 import time
+from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import suppress
 from typing import Any
@@ -20,7 +21,7 @@ from kappaskin.publish import Publishing, SourceState, UdpListener, targets_of
 from kappaskin.publish import udp as transport
 from kappaskin.publish.message import EstimateMessage
 from kappaskin.publish.publishing import MOST_TARGETS, Target, opened, target_of
-from kappaskin.publish.udp import Udp
+from kappaskin.publish.udp import Udp, _Heard
 
 PRESSED = load_scene("off-centre")
 STATE = SourceState("streaming", "", "", None, 0.0, 0.0)
@@ -358,8 +359,8 @@ def test_what_is_none_of_ours_is_counted(listener) -> None:
 )  # fmt: skip
 def test_whatever_a_contact_says_can_be_told(told: dict[str, object]) -> None:
     made = UdpListener.__new__(UdpListener)
-    made.__dict__ |= {"_clock": time.monotonic, "_began": 0.0, "_shown": -1.0, "_number": 3}
-    made.__dict__ |= {"_state": "", "contacts": 0, "lost": 0}
+    made.__dict__ |= {"_clock": time.monotonic, "_began": 0.0}
+    made.__dict__ |= {"_heard": defaultdict(_Heard), "contacts": 0, "lost": 0}
     assert all(line.isprintable() for line in made.lines({"kind": "contact", **told}))
 
 
@@ -369,3 +370,17 @@ def test_a_port_that_is_taken_or_none_is_refused(receiver) -> None:
             UdpListener(port)
     with pytest.raises(Refusal, match="choose another"):
         UdpListener(receiver.getsockname()[1])
+
+
+def test_each_finger_counts_for_itself(receiver, monkeypatch) -> None:
+    listener = UdpListener.__new__(UdpListener)
+    listener.__dict__ |= {"_began": 0.0, "_heard": defaultdict(_Heard), "contacts": 0, "lost": 0}
+    for number in (1, 2, 4):
+        for finger in ("thumb", "index"):
+            message = {"kind": "contact", "finger": finger, "number": number}
+            lines = listener.lines(message)
+    assert (listener.contacts, listener.lost) == (6, 2)
+    assert [line.split("s  ", 1)[1] for line in lines] == ["index  gap       1 messages lost"]
+    for n in range(1000):  # whoever invents fingers takes no memory
+        listener.lines({"kind": "contact", "finger": f"f{n}", "number": n})
+    assert len(listener._heard) <= 65  # noqa: SLF001

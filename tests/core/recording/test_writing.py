@@ -130,11 +130,11 @@ def test_nothing_else_is_taken_for_a_recording(tmp_path) -> None:
         Recording(path)
 
 
-@pytest.mark.parametrize("later", [2, 10**12])
+@pytest.mark.parametrize("later", [3, 10**12])
 def test_one_of_a_later_version_is_refused(later, tmp_path, monkeypatch, written_out) -> None:
     monkeypatch.setattr(writing, "FORMAT", later)
     recorded(tmp_path / "later.mcap", written_out, 3)
-    with pytest.raises(Refusal, match=r"format 1, got [12].*update this program"):
+    with pytest.raises(Refusal, match=r"format 2, got [13].*update this program"):
         Recording(tmp_path / "later.mcap")
 
 

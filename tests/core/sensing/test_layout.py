@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from kappaskin import Cap, Disk, Patch, Plate, Refusal, SensorLayout, SineBasis, basis_for
+from kappaskin.skin import MeshSkin
+from meshes import disk, ellipsoid
 
 PATCH = Patch(0.1, 0.05)
 
@@ -363,3 +365,35 @@ def test_a_cell_over_the_rim_of_a_cap_is_refused():
     assert replace(heights.reading_each(["height"]), cell=(1.9e-3, 0.0)).cell[0]
     with pytest.raises(Refusal, match="over the rim of the cap"):
         replace(heights.reading_each(["height"]), cell=(2.1e-3, 0.0))
+
+
+def test_gages_on_a_mesh_may_be_as_long_as_the_skin_around_them():
+    mesh = MeshSkin(*ellipsoid(14, (8e-3, 8e-3, 16e-3), 1.0), 1e-3)
+    layout = SensorLayout.scattered(mesh, mesh.places[0] + [[0.8 * mesh.a / 2, 0.0]])
+
+    long = replace(layout, gage_length=5e-3)
+
+    assert long.gage_length / 2 > mesh.depth(layout.positions)[0]
+    assert long.has_room(layout.positions).all()
+    with pytest.raises(
+        Refusal, match=r"gages of 0.02 m go over the rim .* at element 0; use short"
+    ):
+        replace(layout, gage_length=20e-3)
+
+
+def test_a_cell_on_a_mesh_lies_along_the_axis_of_its_element():
+    places, triangles = disk(14)
+    mesh = MeshSkin(np.column_stack([10e-3 * places, np.zeros(len(places))]), triangles, 1e-3)
+    basis, turn = basis_for(mesh, "clamped", 6, 6), 0.7
+    layout = SensorLayout.scattered(mesh, [[13e-3, 9e-3]]).reading_each(["height"]).turned([turn])
+    layout = replace(layout, cell=(6e-3, 1e-3))
+    u, v = (each.ravel() for each in np.meshgrid(np.arange(-19.5, 20), np.arange(-19.5, 20)))
+    c, s = 6e-3 * u / 40, 1e-3 * v / 40
+    way, across = np.array([np.cos(turn), np.sin(turn)]), np.array([-np.sin(turn), np.cos(turn)])
+
+    mean = basis.at(layout.positions + np.outer(c, way) + np.outer(s, across)).mean(axis=0)
+
+    scale = np.abs(mean).max()
+    np.testing.assert_allclose(layout.operator(basis)[0], mean, atol=2e-3 * scale, rtol=0)
+    unturned = layout.turned([0.0]).operator(basis)[0]
+    assert np.abs(unturned - mean).max() > 0.05 * scale

@@ -499,7 +499,7 @@ def test_what_is_held_is_the_rim_or_an_arc_of_it():
         ([[0, 0, 0], [np.nan, 0, 0]], "got none"),
         ("some", '"all" or arcs'),
         ([[0, 0, 0], [1, 1]], '"all" or arcs'),
-        ([[0, 0, 0], [30, 0, 0]], "the unit is m"),
+        ([[0, 0, 0], [30, 0, 0]], "give points of the rim in the unit of the mesh"),
         ([[0, 0, 0], [1e-4, 0, 0]], "points further apart"),
     ],
 )

@@ -9,10 +9,17 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from kappaskin import Frame, load_scene
+from kappaskin import Frame, Refusal, load_scene
 from kappaskin.recording import Recorder, Recording, ReplayedSource
 from kappaskin.recording.recompute import RecordedFrames
-from kappaskin.sources import Decoder, SerialSource, SimulatedSource, Source, sensor_to_json
+from kappaskin.sources import (
+    Decoder,
+    SerialSource,
+    SimulatedSource,
+    Source,
+    named_sources,
+    sensor_to_json,
+)
 from kappaskin.sources.wire import Information, Samples, encode_information, encode_samples
 
 SCENE = replace(load_scene("circle"), rate=100.0)
@@ -163,3 +170,26 @@ def of_one(frame: Frame) -> tuple[object, ...]:
     """All that is read of a frame; text for times, since NaN is not itself."""
     times = (frame.device_time, frame.host_time, frame.taken, frame.taken_sd)
     return frame.sequence, repr(times), frame.channels.tobytes(), frame.counts.tobytes()
+
+
+# Sources of several fingers.
+
+
+def test_a_source_of_each_finger_has_its_name_before_it() -> None:
+    assert named_sources(["thumb=sim:", "index_2=/dev/ttyACM0"]) == {
+        "thumb": "sim:",
+        "index_2": "/dev/ttyACM0",
+    }
+    assert named_sources(["a=socket://host:1?x=y=z"]) == {"a": "socket://host:1?x=y=z"}
+
+
+@pytest.mark.parametrize("source", ["sim:", "socket://host:1?x=y", "./a=b.csv", "1=2", "=", "-"])
+def test_one_alone_may_be_without_a_name_whatever_is_in_it(source: str) -> None:
+    assert named_sources([source]) == {"": source}
+
+
+def test_names_of_fingers_are_there_and_differ() -> None:
+    with pytest.raises(Refusal, match="name for each of several sources, such as thumb=sim:"):
+        named_sources(["index=sim:", "sim:"])
+    with pytest.raises(Refusal, match="one source for the finger thumb, got two"):
+        named_sources(["thumb=sim:", "index=sim:", "thumb=sim:circle"])

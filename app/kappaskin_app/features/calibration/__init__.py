@@ -33,7 +33,7 @@ class CalibrationFeature:
         self.calibration = CalibrationController(shell.history, shell.tasks, shell)
         self.weighing = WeightController(shell.history, shell.tasks, shell)
         tares = TareStore(TareStore.user_folder())
-        self.tare_controller = TareController(shell.history, shell.session.engine, tares, shell)
+        self.tare_controller = TareController(shell.history, shell.session, tares, shell)
         self.tare = panels.add(LIVE, TarePanel())
         self.in_use = panels.add(CALIBRATE, InUsePanel())
         self.calibrate = panels.add(CALIBRATE, CalibratePanel())

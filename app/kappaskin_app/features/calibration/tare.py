@@ -7,12 +7,12 @@ from PySide6.QtCore import QObject, Signal
 
 from kappaskin.calibration import Tare, TareStore
 from kappaskin.errors import Refusal
-from kappaskin.live import Engine, Status
+from kappaskin.live import Status
 from kappaskin.sensing import Sensor
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.panel import Panel
-from kappaskin_app.shell.session import RECORDED
+from kappaskin_app.shell.session import RECORDED, Session
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.widgets.parts import button, in_a_row, plain_tip, sentence, text_label
 
@@ -29,10 +29,10 @@ class TareController(QObject):
     reported = Signal(str)
 
     def __init__(
-        self, history: History, engine: Engine, tares: TareStore, parent: QObject | None = None
+        self, history: History, session: Session, tares: TareStore, parent: QObject | None = None
     ) -> None:
         super().__init__(parent)
-        self._history, self._engine, self._tares = history, engine, tares
+        self._history, self._session, self._tares = history, session, tares
         self._status = Status()
         self._connections, self._calibrating = 0, False
         self._before: Tare | None = None  # in use before the last one
@@ -57,7 +57,7 @@ class TareController(QObject):
     @property
     def _recorded(self) -> bool:
         """Whether the source is a recording, whose tare is not that of a connected sensor."""
-        return (self._engine.source or "").startswith(RECORDED)
+        return (self._session.engine.source or "").startswith(RECORDED)
 
     # Requests of the user.
 
@@ -65,7 +65,7 @@ class TareController(QObject):
         """Set the present readings as zero, unless the skin is loaded or moves."""
         if not self.why_not:
             self.message = ""
-            self._engine.tare()
+            self._session.engine.tare()
             self.changed.emit()
 
     def undo(self) -> None:

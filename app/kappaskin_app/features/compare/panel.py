@@ -10,8 +10,10 @@ from kappaskin.bases import edges_of
 from kappaskin.live import PipelineStatus, Status
 from kappaskin.pipeline import Readout
 from kappaskin.sensing import Sensor
+from kappaskin.skin import MeshSkin
 from kappaskin_app.features.compare.comparison import Pair, SetupComparison
 from kappaskin_app.guard import guarded
+from kappaskin_app.shell.badge import functions_of
 from kappaskin_app.shell.colouring import Colouring, SteadyRange, largest
 from kappaskin_app.shell.form import Form
 from kappaskin_app.shell.settings import Settings
@@ -62,7 +64,9 @@ class OtherForm(Form):
 
     def show_pipeline(self, status: PipelineStatus | None, sensor: Sensor | None) -> None:
         if sensor is not None:
-            self.offer("other_edge", ("", *edges_of(sensor.layout.patch)))
+            patch = sensor.layout.patch
+            self.offer("other_edge", ("", *edges_of(patch)))
+            self.show_functions("other_x", "other_y", isinstance(patch, MeshSkin))
         if status is None:
             self.show_message("")
         elif status.computing:
@@ -169,7 +173,8 @@ class ComparePanel(QWidget):
         for name, setup in setups.items():
             if setup is not None:
                 method = METHOD_SHORT.get(setup.method, setup.method)
-                self.maps[name].words.show_text(f"{setup.Ni} x {setup.Nj}, {method}")
+                functions = functions_of(setup, self._status.sensor)
+                self.maps[name].words.show_text(f"{functions} functions, {method}")
         if (difference := pair.difference) is not None:
             rms = math.sqrt(float(np.nanmean(difference**2)))
             self.maps["difference"].words.show_text(f"RMS {length(rms)}")

@@ -100,6 +100,11 @@ _FILE_HINTS = (
     "Element 0 is at low x and low y, at the lower left.",
 )
 
+_SHAPES = (
+    "The skin is a flat rectangle with a grid of elements. For any other, such as a mesh from a "
+    "file, edit [skin] and [elements] of the saved file, as in Help > Guide, Your own sensor."
+)
+
 
 class _Trace(QStyledItemDelegate):
     """Draws the course of a column in its cell."""
@@ -287,6 +292,8 @@ class NewSensorDialog(QDialog):
         form.addRow("Rate", self.rate)
         form.addRow("", self.free)
         form.addRow("Skin", in_a_row(self.known, self.rigidity))
+        form.addRow("", shapes := Label(_SHAPES, wordWrap=True))  # pyright: ignore[reportCallIssue]
+        shapes.setObjectName("hint")
         self.map = SurfaceMap("Readings now", "", "Change of the readings since the beginning.")
         layout = QHBoxLayout(page)
         layout.setContentsMargins(0, 0, 0, 0)

@@ -5,14 +5,17 @@ import math
 import numpy as np
 from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtWidgets import (
+    QCheckBox,
     QHBoxLayout,
     QSlider,
     QVBoxLayout,
     QWidget,
 )
 
+from kappaskin.frames import Array
 from kappaskin.mechanics import DiscLoad, PointLoad
-from kappaskin.studies import Prospect
+from kappaskin.skin import MeshSkin
+from kappaskin.studies import Design, Prospect
 from kappaskin_app.features.design.prediction import (
     ROUND,
     DesignPrediction,
@@ -21,15 +24,17 @@ from kappaskin_app.features.design.prediction import (
 )
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.form import Form, pass_window_keys
+from kappaskin_app.shell.selection import SkinMap
 from kappaskin_app.shell.settings import Settings, form_field
-from kappaskin_app.shell.settings.designed import DesignSettings
+from kappaskin_app.shell.settings.designed import OPEN, DesignSettings
 from kappaskin_app.shell.settings.form_fields import Range
 from kappaskin_app.shell.settings.scene import SHAPES
 from kappaskin_app.widgets.chart import Chart, ChartAxis, Series
 from kappaskin_app.widgets.layout import row, scrolled
 from kappaskin_app.widgets.parts import ELLIPSIS, button, sentence, text_label
 from kappaskin_app.widgets.surface_map import SurfaceMap
-from kappaskin_app.widgets.text import length, round_up
+from kappaskin_app.widgets.text import length
+from kappaskin_app.widgets.tint import Tint
 
 _NAMES = tuple(field for field in DesignSettings.__dataclass_fields__)
 _LENGTHS = tuple(f"design_{length}" for shape in SHAPES.values() for length in shape.lengths)
@@ -50,10 +55,13 @@ _SIMULATED = (
     "errors of contact position or force in thousands of presses all over the skin."
 )
 _MAPS = {
-    "displacement": (1e3, "mm", "Standard deviation"),
-    "contact": (1e3, "mm", "RMS error of the place"),
-    "force": (1e2, "%", "RMS error of the force"),
+    "displacement": "Standard deviation",
+    "contact": "RMS error of the place",
+    "force": "RMS error of the force",
 }
+_FROM_ZERO = 0.2  # of the largest: a map of smaller values begins at 0
+_SMALL = 2e-5  # m: what is at most as large is shown in micrometres
+_FINE = 161  # points along the longer side of the map of a mesh
 _ALONG = "Through the middle of the skin, along x."
 
 
@@ -100,12 +108,16 @@ class DesignForm(Form):
             if isinstance(how, Range):
                 with QSignalBlocker(slider):
                     slider.setValue(_place(getattr(settings, name), how))
-        shown = {f"design_{length}" for length in SHAPES[settings.design_shape].lengths}
-        shown |= (noise := set(noise_settings(settings).values()))
-        shown |= {"design_conversion"} if noise == {"design_noise"} else set()
-        shown |= {*_PATTERNS[pattern_of(settings)]}
+        shape, shown = SHAPES.get(settings.design_shape), set[str]()
         hidden = {*_LENGTHS, *_NOISE, "design_conversion", *sum(_PATTERNS.values(), ())}
-        hidden |= set() if SHAPES[settings.design_shape].make in ROUND else {"design_pattern"}
+        hidden |= set() if shape and shape.make in ROUND else {"design_pattern"}
+        if shape is None:  # the open scene has them
+            hidden |= {"design_reads"}
+        else:
+            shown = {f"design_{length}" for length in shape.lengths}
+            shown |= (noise := set(noise_settings(settings).values()))
+            shown |= {"design_conversion"} if noise == {"design_noise"} else set()
+            shown |= {*_PATTERNS[pattern_of(settings)]}
         self.show_rows(shown | (set(_NAMES) - hidden))
 
 
@@ -140,6 +152,12 @@ class DesignPanel(QWidget):
         self.form = DesignForm()
         self.predicted = SurfaceMap("Predicted", "mm", _PREDICTED)
         self.simulated = SurfaceMap("Simulated", "mm", _SIMULATED)
+        self.on_skin = QCheckBox("Show on the skin")
+        self.on_skin.setChecked(True)
+        self.on_skin.setToolTip(
+            "Colour the skin by the predicted map of the open scene while this panel is visible, "
+            "and draw its elements where they are placed."
+        )
         self.along = Chart(ChartAxis("Standard deviation", "mm"), ChartAxis("x", "mm"), _ALONG)
         self.words = text_label()
         self.simulate = button(
@@ -167,6 +185,7 @@ class DesignPanel(QWidget):
         around.addWidget(self.simulated, 3)
         right.addWidget(self.words)
         right.addWidget(self.along, 1)
+        right.addWidget(self.on_skin)
         right.addWidget(row(self.simulate, self.save))
         around.addLayout(right, 3)
 
@@ -180,6 +199,7 @@ class DesignPanel(QWidget):
 
     def show_settings(self, settings: Settings) -> None:
         self.form.show_settings(settings)
+        self.on_skin.setVisible(settings.design_shape == OPEN)
 
     def _show(self) -> None:
         prediction = self._prediction
@@ -196,23 +216,29 @@ class DesignPanel(QWidget):
         self._show_words(found)
 
     def _show_maps(self, found: Prospect | None) -> None:
-        check = self._prediction.check if self._prediction else None
-        sides = (1.0, 1.0) if found is None else (float(found.x[-1]), float(found.y[-1]))
-        scale, unit, title = _MAPS["displacement" if found is None else found.of]
+        prediction, placed = self._prediction, self._prediction and self._prediction.placed
+        check = prediction.check if prediction else None
+        patch = placed.scene.plate.patch if placed else None
+        sides = (1.0, 1.0) if patch is None else (patch.a, patch.b)
         shown = [] if found is None else [found.sd]
         if found is not None and check is not None and found.of == "displacement":
             shown.append(check.sd)  # of presses, a few at a place, the errors scatter
-        limit = round_up(max((scale * float(np.nanmax(sd)) for sd in shown), default=0.0)) or 1.0
-        curves = list[Series]()
+        tint, title = tint_of(found, shown), _MAPS["displacement" if found is None else found.of]
+        scale, unit, curves = scale_of(found), tint.unit, list[Series]()
         for number, (view, source, name) in enumerate(
             ((self.predicted, found, "predicted"), (self.simulated, check, "simulated"))
         ):
-            sd = None if source is None else scale * source.sd
+            sd, x = None, np.empty(0)
+            if source is not None and found is not None and patch is not None:
+                sd, x = scale * source.sd, found.x
+                if sd.ndim == 1:  # at the nodes of a mesh
+                    nx, ny = (round(_FINE * side / max(sides)) for side in sides)
+                    sd, x = scale * found.surface(patch, nx, ny, source.sd), patch.grid(nx, ny)[0]
+                curves.append(Series(name, 1e3 * x, sd[len(sd) // 2], number))
             view.unit = unit
-            view.show_surface(sd, (0.0, limit), "sequential", np.full(2, np.nan), sides)
-            view.map.show_points(None if sd is None or found is None else found.positions)
-            if sd is not None and found is not None:
-                curves.append(Series(name, 1e3 * found.x, sd[len(sd) // 2], number))
+            view.show_surface(sd, tint.limits, "sequential", np.full(2, np.nan), sides)
+            outline = np.array(patch.vertices) if isinstance(patch, MeshSkin) else None
+            view.map.show_points(None if sd is None or found is None else found.positions, outline)
         if (title, unit) != (self.along.y_axis.title, self.along.y_axis.unit):
             self.along.show_axes(ChartAxis(title, unit), self.along.x_axis, _ALONG)
         self.along.show_series(curves, "No design yet.")
@@ -236,12 +262,14 @@ class DesignPanel(QWidget):
                 "worst."
             )
         else:
-            text = _share if found.of == "force" else length
-            self.predicted.words.show_text(f"Median {text(found.median)}")
+            unit = tint_of(found, [found.sd]).unit
+            median, worst = (
+                f"{scale_of(found) * value:.2g} {unit}" for value in (found.median, found.worst)
+            )
+            self.predicted.words.show_text(f"Median {median}")
             words[0] += (
-                f" Due to noise under {found.load.force:.2g} N{_size(found.load)}: "
-                f"{text(found.median)} in the median over the skin, {text(found.worst)} at "
-                "worst."
+                f" Due to noise under {found.load.force:.2g} N{_size(found.load)}: {median} in the "
+                f"median over the skin, {worst} at worst."
             )
         if check is not None:
             all_errors = ", all errors included" if found.load else ""
@@ -254,8 +282,31 @@ class DesignPanel(QWidget):
         self.words.setText("\n".join(words))
 
 
-def _share(value: float) -> str:
-    return f"{100 * value:.2g} %"
+def scale_of(found: Prospect | None) -> float:
+    """What the errors of a prospect are multiplied with to be shown."""
+    if found is not None and found.of == "force":
+        return 1e2
+    small = found is not None and found.of == "contact" and found.worst <= _SMALL
+    return 1e6 if small else 1e3
+
+
+def tint_of(found: Prospect | None, shown: list[Array]) -> Tint:
+    """The colours of the errors `shown`, from the least to the largest."""
+    scale = scale_of(found)
+    unit = {1e2: "%", 1e3: "mm", 1e6: "\N{MICRO SIGN}m"}[scale]
+    most = max((scale * float(np.nanmax(sd)) for sd in shown), default=1.0) or 1.0
+    least = min((scale * float(np.nanmin(sd)) for sd in shown), default=0.0)
+    step = 10.0 ** (math.floor(math.log10(most)) - 1)
+    least = step * math.floor(least / step) if least > _FROM_ZERO * most else 0.0
+    return Tint("sequential", (least, step * math.ceil(most / step)), unit)
+
+
+def skin_map(placed: Design, found: Prospect, nx: int, ny: int) -> SkinMap:
+    """The map on nx x ny points of the skin."""
+    values = scale_of(found) * found.surface(placed.scene.plate.patch, nx, ny)
+    load = f" under {found.load.force:.2g} N{_size(found.load)}" if found.load else ""
+    words = f"Colours: {_MAPS[found.of]}{load}, predicted, no measurement"
+    return SkinMap(values, tint_of(found, [found.sd]), words, _MAPS[found.of], found.positions)
 
 
 def _size(load: PointLoad | DiscLoad) -> str:

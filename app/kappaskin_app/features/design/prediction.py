@@ -18,11 +18,12 @@ from kappaskin.scenes.effects import GaussianNoise
 from kappaskin.sensing import DigitalReadings, SensorLayout, Transduction, kind_of_reading
 from kappaskin.skin import Cap, Disk, Patch
 from kappaskin.studies import Check, Design, Prospect, check, prospect
+from kappaskin_app.shell import simulation
 from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.loads import load_case_stimuli, reference_on
-from kappaskin_app.shell.settings import Settings, part
-from kappaskin_app.shell.settings.designed import DesignSettings
+from kappaskin_app.shell.settings import SceneSettings, Settings, part
+from kappaskin_app.shell.settings.designed import OPEN, DesignSettings
 from kappaskin_app.shell.settings.scene import SHAPES
 
 
@@ -48,7 +49,8 @@ def noise_settings(settings: Settings) -> dict[str, str]:
 
 def pattern_of(settings: Settings) -> str:
     """The pattern of the elements: a grid, or on a round skin the one that is selected."""
-    return settings.design_pattern if SHAPES[settings.design_shape].make in ROUND else "grid"
+    shape = SHAPES.get(settings.design_shape)
+    return settings.design_pattern if shape and shape.make in ROUND else "grid"
 
 
 def _layout(settings: Settings, patch: Patch) -> SensorLayout:
@@ -81,7 +83,9 @@ def _load(plate: Plate, edge: str) -> tuple[tuple[Stimulus, ...], tuple[int, int
 
 
 def scene_of(settings: Settings) -> Scene:
-    """The design with its elements in their pattern, and a load in the middle."""
+    """The design with its elements in their pattern, and a load in the middle; or what is open."""
+    if settings.design_shape == OPEN:
+        return simulation.scene_of(settings)
     s, patch = settings, patch_of(settings)
     layout = _layout(s, patch)
     edge = SHAPES[s.design_shape].defaults.get("edge", edges_of(patch)[0])
@@ -118,28 +122,28 @@ def design_of(settings: Settings) -> Design:
     return Design(scene_of(s), (s.design_functions_x, s.design_functions_y), s.design_place)
 
 
-def _prospect(settings: Settings) -> Prospect:
-    return prospect(design_of(settings), settings.design_map)
+def _prospect(settings: Settings) -> tuple[Design, Prospect]:
+    """The design with its elements placed, and what is predicted of it."""
+    placed = design_of(settings).placed()
+    return placed, prospect(placed, settings.design_map)
 
 
-def _placed(settings: Settings, found: Prospect) -> Scene:
-    """The scene of the design with its elements at their computed positions."""
-    scene = scene_of(settings)
-    if settings.design_place == "scene":
-        return scene
-    return replace(scene, layout=replace(scene.layout, positions=found.positions, shape=None))
+def _checks(placed: Design, of: str) -> Generator[Check]:
+    return check(placed, of=of)
 
 
-def _checks(settings: Settings, found: Prospect) -> Generator[Check]:
-    placed = replace(design_of(settings), scene=_placed(settings, found), by="scene")
-    return check(placed, of=settings.design_map)
+def _designed(settings: Settings) -> tuple[object, ...]:
+    """The settings that the design depends on."""
+    scene = part(settings, SceneSettings) if settings.design_shape == OPEN else ()
+    return (*part(settings, DesignSettings), *scene)
 
 
 class DesignPrediction(QObject):
     """Predicts the design while its panel is visible; `changed` reports a new result.
 
-    `prospect` is the last prediction, of the present design unless it is `predicting`; `check` is
-    its simulation, and `refusal` the reason where there is none.
+    `prospect` is the last prediction, of the present design unless it is `predicting`, and `placed`
+    its design with the elements where they are; `check` is its simulation, and `refusal` the reason
+    where there is none.
     """
 
     changed = Signal()
@@ -148,6 +152,7 @@ class DesignPrediction(QObject):
         super().__init__(parent)
         self._history = history
         self.prospect: Prospect | None = None
+        self.placed: Design | None = None
         self.check: Check | None = None
         self.refusal = ""
         self.predicts = BackgroundTask(
@@ -187,10 +192,9 @@ class DesignPrediction(QObject):
     def follow(self, _: Status) -> None:
         """Predict again when the design has changed."""
         settings, requested = self._history.settings, self._requested
-        changed = requested is None or part(settings, DesignSettings) != part(
-            requested, DesignSettings
-        )
-        if self._active and changed:
+        if not self._active or settings is requested:
+            return
+        if requested is None or _designed(settings) != _designed(requested):
             self._begin(settings)
 
     def _begin(self, settings: Settings) -> None:
@@ -199,7 +203,8 @@ class DesignPrediction(QObject):
         self._stop()
         self._requested, self.check, self.refusal = settings, None, ""
         # Optimised positions and computed modes take seconds, contacts a fifth of one.
-        plain = "side_x" in SHAPES[settings.design_shape].lengths
+        shape = SHAPES.get(settings.design_shape)
+        plain = shape is not None and "side_x" in shape.lengths
         self._quick = plain and settings.design_place in ("scene", "clustered")
         if self._quick:
             self.predicts.run(_prospect, settings)
@@ -207,8 +212,18 @@ class DesignPrediction(QObject):
             self.predicts.compute(_prospect, settings)
         self.changed.emit()
 
-    def _take(self, found: Prospect) -> None:
-        self.prospect = found
+    @property
+    def open_map(self) -> tuple[Design, Prospect] | None:
+        """What is predicted of the scene that is open, while the panel is visible."""
+        requested = self._requested
+        if requested is None or requested.design_shape != OPEN or self.predicting:
+            return None
+        return (
+            None if self.placed is None or self.prospect is None else (self.placed, self.prospect)
+        )
+
+    def _take(self, found: tuple[Design, Prospect]) -> None:
+        self.placed, self.prospect = found
 
     def _take_check(self, found: Check) -> None:
         self.check = found
@@ -221,18 +236,18 @@ class DesignPrediction(QObject):
         """Start the check by simulation, or stop it."""
         if self.checking:
             self.checks.stop()
-        elif self._requested is not None and self.prospect is not None and not self.predicting:
+        elif self.placed is not None and self.prospect is not None and not self.predicting:
             self.check = None
-            self.checks.compute(_checks, self._requested, self.prospect)
+            self.checks.compute(_checks, self.placed, self.prospect.of)
         self.changed.emit()
 
     def write(self, file: Path) -> None:
         """Write the design into a scene file; a `Refusal` where that fails."""
-        if self._requested is None or self.prospect is None or self.predicting:
+        if self.placed is None or self.prospect is None or self.predicting:
             raise Refusal(
                 "expected a design with a prediction, got none; change it until a map is shown"
             )
-        write_whole(file, write_scene(_placed(self._requested, self.prospect)))
+        write_whole(file, write_scene(self.placed.scene))
 
     def _stop(self) -> None:
         self.predicts.stop()

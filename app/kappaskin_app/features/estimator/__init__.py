@@ -1,9 +1,5 @@
 """Panel of the estimator and its basis."""
 
-from typing import cast
-
-from PySide6.QtWidgets import QLabel
-
 from kappaskin.bases import edges_of
 from kappaskin.live import Status
 from kappaskin.skin import MeshSkin
@@ -13,7 +9,6 @@ from kappaskin_app.shell.pages import LIVE
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.window import MainWindow
 
-_ON_MESH = "Functions, N =", "\N{MULTIPLICATION SIGN}"
 _SOFTEST = "N = {} functions: the softest shapes of the mesh."
 
 
@@ -35,10 +30,6 @@ class BasisPanel(Form):
 
     def __init__(self) -> None:
         super().__init__("Basis", ("functions_x", "functions_y", "method", "fit_edge"))
-        self._labels = [
-            cast("QLabel", self.form.labelForField(self.editor(name))) for name in self.names[:2]
-        ]
-        self._words = [label.text() for label in self._labels]
         self._count = 0
 
     def show_settings(self, settings: Settings) -> None:
@@ -49,9 +40,10 @@ class BasisPanel(Form):
         if status.sensor is not None:
             self.offer("fit_edge", ("", *edges_of(status.sensor.layout.patch)))
         on_mesh = status.sensor is not None and isinstance(status.sensor.layout.patch, MeshSkin)
-        for label, words in zip(self._labels, _ON_MESH if on_mesh else self._words, strict=True):
-            label.setText(words)
-        if words := "Computing\N{HORIZONTAL ELLIPSIS}" if status.computing else in_use(status):
+        self.show_functions("functions_x", "functions_y", on_mesh)
+        if status.computing:
+            self.show_message("Computing\N{HORIZONTAL ELLIPSIS}", hint=True)
+        elif words := in_use(status):
             self.show_message(words)
         else:
             self.show_message(_SOFTEST.format(self._count) if on_mesh else "", hint=True)

@@ -101,7 +101,8 @@ class MembraneView(QWidget):
         self._shown = dict.fromkeys(("fit", "elements", "truth", "contact", "load"), True)
         self._of_elements: Indices = np.empty(0, np.intp)
         self._elements_at_rest = (np.empty((0, 3)), np.empty((0, 3)))
-        self._positions, self._marked = np.empty((0, 2)), (b"", -1)
+        self._positions = self._own_elements = np.empty((0, 2))
+        self._marked = b"", -1
         self._arrays: dict[str, Any] = {}
         self._ink = "#ffffff"
         follow_look(self, self._apply_theme)
@@ -170,26 +171,32 @@ class MembraneView(QWidget):
         self._positions = sensor.layout.positions
         self.show_marked(np.empty(0, np.intp), -1)
         self.point(-1)
-        self._place_elements(sensor.layout.positions[sensor.layout.alive])
+        self._own_elements = sensor.layout.positions[sensor.layout.alive]
+        self.show_elements()
         for ball in self._contacts:
             ball.scale = skin.size
-        # VTK arrays that change; looking them up takes longer than filling them.
-        self._arrays = {"elements": self._elements.points}
         self.sides.show_skin(skin)
         self.show_box(self._box.shares)
         if another:
             self.camera_control.place()
 
-    def _place_elements(self, positions: Array) -> None:
+    def show_elements(self, positions: Array | None = None) -> None:
+        """Draw elements at `positions` (P, 2) in m, or those of the sensor where None."""
+        if self.surface.actor is None:
+            return
+        positions = self._own_elements if positions is None else positions
         self._elements_at_rest = self.skin.at_rest(positions)
         self._of_elements = self.skin.nearest(positions)
         points, out = self._elements_at_rest
         self._elements_actor.visibility = self._shown["elements"]
         self._size_elements()
-        self._elements.points = points + self.lift * out
+        height = self.skin.height.ravel()[self._of_elements] + self.lift
+        self._elements.points = points + out * height[:, None]
         self._elements.verts = np.column_stack(
             [np.ones(len(points), int), np.arange(len(points))]
         ).ravel()
+        # VTK arrays that change; looking them up takes longer than filling them.
+        self._arrays = {"elements": self._elements.points}
 
     def _size_elements(self) -> None:
         size = min(_POINT, _POINTS / max(len(self._positions), 1) ** 0.5) * magnified(self.plotter)

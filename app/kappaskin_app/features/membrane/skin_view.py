@@ -23,7 +23,6 @@ from kappaskin_app.shell.settings import Settings, locked_at
 from kappaskin_app.theme import current
 from kappaskin_app.widgets.colour_bar import SkinScale
 from kappaskin_app.widgets.text import Coverage
-from kappaskin_app.widgets.tint import Tint
 
 _MARKS = 0.06  # s between two updates of the marks
 
@@ -56,7 +55,7 @@ class SkinView(QObject):
         )
         selection.pointed.connect(guarded(self.membrane.point))
         selection.target_changed.connect(guarded(lambda *_: self._show_marked()))
-        selection.mode_changed.connect(guarded(self._show_mode))
+        selection.map_changed.connect(guarded(self._show_map))
 
     def show_settings(self, settings: Settings) -> None:
         self._settings = settings
@@ -85,17 +84,19 @@ class SkinView(QObject):
 
     def _limits(self) -> dict[str, float]:
         """Colour limit by the name of the quantity."""
-        if self._selection.mode is not None:
+        if self._selection.map is not None:
             return {}
         return {self._settings.colour_by: self.limit_shown()}
 
-    def _show_mode(self) -> None:
-        self.membrane.show_caption(self._selection.mode_words)
+    def _show_map(self) -> None:
+        shown = self._selection.map
+        self.membrane.show_caption(shown.words if shown else "")
+        self.membrane.show_elements(shown.positions if shown else None)
         self._allow_lock()
 
     def _allow_lock(self) -> None:
         """Enable the lock for quantities with a range."""
-        ranged = self._selection.mode is None and self._settings.colour_by != "health"
+        ranged = self._selection.map is None and self._settings.colour_by != "health"
         self.scale.lock.setEnabled(ranged)
 
     def _restart(self, status: Status) -> None:
@@ -155,9 +156,10 @@ class SkinView(QObject):
 
     def _colour(self, shown: Shown) -> None:
         name, times, display = self._settings.colour_by, self._times(), self._display
-        estimate, mode, shade, beside = shown.estimate, self._selection.mode, self._shade, ()
-        if mode is not None and mode.shape == estimate.surface.shape:
-            tint, values = Tint("diverging", (-1.0, 1.0), "shape"), mode
+        estimate, shade, beside = shown.estimate, self._shade, ()
+        what = shade.label, shade.symbol
+        if (other := self._selection.map) and other.values.shape == estimate.surface.shape:
+            tint, values, what = other.tint, other.values, (other.label, "")
         elif shade.on_surface is not None and self._settings.colour_from == "smooth":
             values = display.colouring.on_surface(name, estimate)
             tint = display.tint(name, estimate, values, shown.now)
@@ -178,13 +180,12 @@ class SkinView(QObject):
         self.membrane.limited = times < self._settings.exaggeration
         self.membrane.show_estimate(estimate, values, tint.limits, times)
         self.scale.bar.show_tint(tint, beside)
-        what = ("", "") if tint.unit == "shape" else (shade.label, shade.symbol)
         self.scale.show_what(*what, shade.tip)
 
     def _show_reason(self, name: str, values: NDArray[np.generic]) -> None:
         """Show in the view why there are no colours."""
         known = name == "health" or values.dtype == np.uint8 or bool(np.isfinite(values).any())
-        if self._selection.mode is None:
+        if self._selection.map is None:
             self.membrane.show_caption("" if known else self._shade.unknown)
 
     def _times(self) -> float:

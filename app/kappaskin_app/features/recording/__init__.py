@@ -25,7 +25,7 @@ class RecordingFeature:
         self._shell, session = shell, shell.session
         self.recording = shell.panels.add(LIVE, RecordingPanel())
         self.transport, banner = Transport(), shell.display.banner
-        self.recorder = RecordingControl(session.engine, shell.tasks, banner, shell)
+        self.recorder = RecordingControl(session, shell.tasks, banner, shell)
         self.playback = PlaybackControl(shell.history, session, self.transport, shell.tasks, shell)
         shell.display.centre.add_below(self.transport)
         self.recorder.add_actions(shell.actions_by_name)
@@ -40,7 +40,7 @@ class RecordingFeature:
     def _wire_recorder(self, shell: MainWindow) -> None:
         session, recorder = shell.session, self.recorder
         session.reported.connect(guarded(recorder.follow))
-        self._handover = SettingsHandover(shell.history, session.engine)
+        self._handover = SettingsHandover(shell.history, session)
         session.reported.connect(guarded(self._handover.follow))
         recorder.notified.connect(guarded(shell.notify))
         recorder.play_wanted.connect(guarded(self.playback.open_file))

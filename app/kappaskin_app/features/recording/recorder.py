@@ -9,7 +9,7 @@ from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import QFileDialog, QInputDialog, QLineEdit, QMessageBox, QWidget
 
 from kappaskin.errors import Refusal
-from kappaskin.live import LONGEST_NOTE, Engine, ResumeInfo, Status
+from kappaskin.live import LONGEST_NOTE, ResumeInfo, Status
 from kappaskin.recording import RecordingStatus, Repaired, RepairTask, part_of, renamed
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.actions import Actions
@@ -24,6 +24,7 @@ from kappaskin_app.shell.folders import (
     unfinished,
 )
 from kappaskin_app.shell.recovery import resume_text
+from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.work_dialog import (
     WorkDialog,
     path_in,
@@ -105,9 +106,11 @@ class RecordingControl(QObject):
     changed = Signal()
     play_wanted = Signal(Path)
 
-    def __init__(self, engine: Engine, tasks: Tasks, banner: ActionBanner, window: QWidget) -> None:
+    def __init__(
+        self, session: Session, tasks: Tasks, banner: ActionBanner, window: QWidget
+    ) -> None:
         super().__init__(window)
-        self._engine, self._banner, self._window = engine, banner, window
+        self._session, self._banner, self._window = session, banner, window
         self._replays = False
         self.written = RecordingStatus()
         self.message, self.alarming = "", False
@@ -140,7 +143,7 @@ class RecordingControl(QObject):
     def toggle(self) -> None:
         """Record to a file named by the time, or stop."""
         if self.recording:
-            self._engine.record(None)
+            self._session.record(None)
         elif self.why_not:
             self.notified.emit(self.why_not)
         else:
@@ -160,7 +163,7 @@ class RecordingControl(QObject):
         """Record to `path`."""
         self._banner.hide()
         self._set_message("")
-        self._engine.record(path)
+        self._session.record(path)
 
     def note(self) -> None:
         """Ask for a note, and add it to the events."""
@@ -173,7 +176,7 @@ class RecordingControl(QObject):
     def write_down(self, text: str) -> None:
         """Add `text` to the events, unless it is empty."""
         if text.strip():
-            self._engine.note(text.strip())
+            self._session.engine.note(text.strip())
 
     def may_close(self) -> bool:
         """Whether the window may close; asks first while recording."""

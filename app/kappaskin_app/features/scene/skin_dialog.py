@@ -2,9 +2,10 @@
 
 import json
 import math
+from collections.abc import Generator
 from dataclasses import fields
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from PySide6.QtCore import QPoint, QPointF, QSize, Qt, Signal
@@ -26,7 +27,9 @@ from PySide6.QtWidgets import (
 )
 
 from kappaskin._files import write_whole
+from kappaskin._processes import with_progress
 from kappaskin._text import printable
+from kappaskin.contact import PointContact
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Indices, Mask
 from kappaskin.mechanics import DiscLoad, Load
@@ -56,6 +59,7 @@ _POISSON = 0.3
 _FUNCTIONS, _PER_FUNCTION = 15, 4  # along a side, of the true shape; nodes for each
 _RADIUS = 0.12  # of the shorter side: of the disc that presses the new skin
 _DEPTH = 0.3  # of its thickness, that it presses
+_READ, _PRESSED = 0.05, 0.35  # of the time: when the mesh is read, and its functions computed
 _STEPS = (
     '{ step = "press", seconds = 0.6 }',
     '{ step = "hold", seconds = 2.0 }',
@@ -69,8 +73,12 @@ _REPAIRS = {
     "keep largest part": "&Keep the largest part",
     "decimate": "&Decimate",
 }
-_HINT = "Drag to turn. Click two places on the rim, counter-clockwise seen from outside."
+_HINT = (
+    "Drag to turn; orange is the inside. Click two places on the rim, counter-clockwise seen from "
+    "outside."
+)
 _SAMPLES, _MOST_DOTS = 1_500_000, 1000
+_MOST_DRAWN = 100_000  # triangles
 _DOT, _BEHIND = 3.0, 0.3  # px, of a fault; opacity of what is behind the surface
 _JUST_BEHIND = 3.0  # px
 _NEAR = 14.0  # px from a click to a node of the rim
@@ -100,7 +108,8 @@ class SurfacePreview(QWidget):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAccessibleName("The mesh; the arrow keys turn it")
         self.setToolTip("Drag, or press the arrow keys, to turn. Orange: seen from inside.")
-        self.surface: MeshSurface | None = None
+        self.surface = self._shown = cast("MeshSurface | None", None)
+        self._box = np.zeros(3), np.zeros(3)
         self.places, self.held = np.empty((0, 3)), np.empty((0, 2), np.intp)
         self._pressed: QPoint | None = None
         self._last, self._image, self._near = QPoint(), QImage(), np.empty((1, 1))
@@ -116,11 +125,17 @@ class SurfacePreview(QWidget):
 
     def show_surface(self, surface: MeshSurface | None, places: Array, held: Indices) -> None:
         """Draw a surface, faults at `places` (k, 3) in m, and `held` sides (H, 2) of its rim."""
+        self.places, self.held = places, held
+        if surface is self._shown:
+            self.update()
+            return
+        self._shown = self.surface = surface
         if surface is not None:
-            surface = surface.part(np.isfinite(np.ptp(surface.corners, axis=(1, 2))))
-        another = surface is not self.surface
-        self.surface, self.places, self.held = surface, places, held
-        self._redraw() if another else self.update()
+            finite = np.isfinite(surface.nodes @ np.ones(3))
+            self.surface = surface.part(np.logical_and.reduce(finite[surface.triangles], axis=1))
+        nodes = _finite(surface)
+        self._box = nodes.min(axis=0), nodes.max(axis=0)
+        self._redraw()
 
     def _redraw(self) -> None:
         self._image = QImage()
@@ -128,8 +143,7 @@ class SurfacePreview(QWidget):
 
     def seen(self, points: Array) -> Array:
         """Where `points` (k, 3) in m are on the widget: x and y in px, and towards the viewer."""
-        nodes = _finite(self.surface)
-        low, high = nodes.min(axis=0), nodes.max(axis=0)
+        low, high = self._box
         size = float(np.linalg.norm(high - low)) or 1.0
         scale = _MARGIN * min(self.width(), self.height()) / size
         found = scale * (points - (low + high) / 2) @ self._axes.T
@@ -145,7 +159,7 @@ class SurfacePreview(QWidget):
             painter.drawImage(0, 0, self._image)
             painter.setRenderHint(QPainter.RenderHint.Antialiasing)
             for sides, colour, width in (
-                (self.surface.rim, current().text, 1.2),
+                (self._rim(self.surface), current().text, 1.2),
                 (self.held, current().accent, 5.0),
             ):
                 painter.setPen(QPen(QColor(colour), width))
@@ -161,6 +175,10 @@ class SurfacePreview(QWidget):
                 painter.setOpacity(_BEHIND if behind else 1.0)
                 painter.drawEllipse(QPointF(x, y), _DOT, _DOT)
 
+    def _rim(self, surface: MeshSurface) -> Indices:
+        """The sides (R, 2) of the rim; none of a mesh with which nothing can be done before."""
+        return surface.rim if len(surface.triangles) <= _MOST_DRAWN else np.empty((0, 2), np.intp)
+
     def _is_behind(self, seen: Array) -> Mask:
         """Whether points (k, 3) as seen are behind the surface."""
         height, width = self._near.shape
@@ -168,12 +186,14 @@ class SurfacePreview(QWidget):
         return seen[:, 2] < self._near[y, x] - _JUST_BEHIND
 
     def _picture(self, surface: MeshSurface) -> QImage:
-        """Its triangles as dots, those nearer over those farther."""
+        """Its triangles as dots, those nearer over those farther; of very many some."""
+        if (every := -(-len(surface.triangles) // _MOST_DRAWN)) > 1:
+            surface = MeshSurface(surface.nodes, surface.triangles[::every])
         width, height = self.width(), self.height()
         corners = self.seen(surface.corners.reshape(-1, 3)).reshape(-1, 3, 3)
         flat = corners[..., :2]
         longest = np.linalg.norm(flat - np.roll(flat, 1, axis=1), axis=2).max(axis=1)
-        rows = np.clip(np.ceil(1.3 * longest), 1, 2000)
+        rows = np.clip(np.ceil(1.3 * longest * math.sqrt(every)), 1, 2000)
         rows = np.ceil(rows * min(1.0, np.sqrt(_SAMPLES / max((rows**2).sum(), 1.0)))).astype(int)
         of = np.repeat(np.arange(len(rows)), rows**2)
         number = np.arange(len(of)) - np.repeat(np.cumsum(rows**2) - rows**2, rows**2)
@@ -215,8 +235,8 @@ class SurfacePreview(QWidget):
         at, surface = event.position().toPoint(), self.surface
         if surface is None or self._pressed is None:
             return
-        if (at - self._pressed).manhattanLength() <= _STILL and len(surface.rim):
-            nodes = np.unique(surface.rim)
+        if (at - self._pressed).manhattanLength() <= _STILL and len(rim := self._rim(surface)):
+            nodes = np.unique(rim)
             x, y, near = self.seen(surface.nodes[nodes]).T
             far = np.hypot(x - at.x(), y - at.y())
             # Of two rims behind one another the nearer one.
@@ -251,11 +271,12 @@ class SkinDialog(QDialog):
         self.setWindowTitle("Open a skin")
         self.file, self._next = Path(), 0
         self._read: MeshSurface | None = None  # as in the file, its numbers taken as metres
+        self.surface: MeshSurface | None = None  # in m; None before it is read and its unit known
         self._faults: list[MeshFault] | None = None
         self._used, self._repaired = Path(), False  # the file that the scene names
-        words, cancelled = "Computing the functions of the skin", "Cancelled; nothing is simulated."
+        words, cancelled = "Setting up the skin", "Cancelled; nothing is simulated."
         self._reading = BackgroundTask[Any](tasks, "Reading the mesh", self._take, self._refuse)
-        self._making = BackgroundTask[Written](
+        self._making = BackgroundTask[Written | float](
             tasks, words, self._finish, self._refuse, cancelled=cancelled
         )
         self.preview = SurfacePreview()
@@ -295,7 +316,7 @@ class SkinDialog(QDialog):
             self.form.addRow(words, widget)
         self.unit.currentIndexChanged.connect(guarded(lambda *_: self._examine()))
         self.held.currentIndexChanged.connect(guarded(lambda *_: self._show()))
-        self.bar = QProgressBar(maximum=0)  # pyright: ignore[reportCallIssue]
+        self.bar = QProgressBar(maximum=100)  # pyright: ignore[reportCallIssue]
         self.begin_button = button("&Simulate", "simulate-skin", "Simulate this skin.")
         self.cancel_button = button("C&lose", "close-skin", "Close (Esc).")
         self.begin_button.setDefault(True)
@@ -336,29 +357,23 @@ class SkinDialog(QDialog):
 
     def begin(self, file: Path) -> None:
         """Read the mesh in a file, and show the dialog."""
-        self.file, self._read, self._faults, self._next = file, None, None, 0
+        self.file, self._read, self.surface, self._faults, self._next = file, None, None, None, 0
         self.unit.clear()
         self.held.setCurrentIndex(0)
         for line in self.ends:
             line.clear()
         self.about.setText(printable(file.name))
-        self._reading.run(read_surface, file, "m")
+        self._reading.compute(read_surface, file, "m")
         self._show(f"Reading{ELLIPSIS}")
         self.show()
         self.raise_()
 
-    @property
-    def surface(self) -> MeshSurface | None:
-        """The surface in m; None before it is read and its unit known."""
-        if self._read is None or not (unit := self.unit.currentData()):
-            return None
-        return MeshSurface(UNITS[unit] * self._read.nodes, self._read.triangles)
-
     def _examine(self) -> None:
-        self._faults = None
-        if (surface := self.surface) is not None:
-            self._reading.run(faults, surface)
-        self._show("" if surface is None else f"Looking for faults{ELLIPSIS}")
+        self._faults, self.surface = None, None
+        if self._read is not None and (unit := self.unit.currentData()):
+            self.surface = MeshSurface(UNITS[unit] * self._read.nodes, self._read.triangles)
+            self._reading.compute(faults, self.surface)
+        self._show("" if self.surface is None else f"Looking for faults{ELLIPSIS}")
 
     def _take(self, found: MeshSurface | list[MeshFault]) -> None:
         if isinstance(found, list):
@@ -375,13 +390,13 @@ class SkinDialog(QDialog):
                 self.unit.addItem(unit, unit)
         size = np.ptp(_finite(found), axis=0)
         for row, (unit, scale) in enumerate(UNITS.items(), 1):
-            sides = " x ".join(f"{1e3 * scale * side:.3g}" for side in size)
+            sides = " x ".join(f"{float(f'{1e3 * scale * side:.3g}'):,.10g}" for side in size)
             self.unit.setItemText(row, f"{unit}: the skin is {sides} mm")
         self._examine()
 
     def _repair(self, fault: MeshFault) -> None:
         if self._read is not None and fault.repair:
-            self._reading.run(repaired, self._read, fault.repair)
+            self._reading.compute(repaired, self._read, fault.repair)
             self._show(f"Repairing{ELLIPSIS}")
 
     def _refuse(self, error: Exception) -> None:
@@ -432,7 +447,7 @@ class SkinDialog(QDialog):
             words = words or "Select the unit of length of the file"
         if faulty:
             words = words or "Repair the faults here, or in a mesh program, to simulate this skin"
-        self._show_faults(faulty or [])
+        self._show_faults(faulty or [], not busy)
         places = [fault.places for fault in faulty or []]
         self.preview.show_surface(
             self._drawn(surface), np.concatenate([*places, np.empty((0, 3))]), held
@@ -440,6 +455,7 @@ class SkinDialog(QDialog):
         for line in self.ends:
             self.form.setRowVisible(line, self.held.currentIndex() == 1)
         self.bar.setVisible(busy)
+        self.bar.setRange(0, 100 if self._making.running else 0)  # of reading no share is known
         for widget in self._inputs:
             widget.setEnabled(not self._making.running)
         self.begin_button.setEnabled(ready)
@@ -449,7 +465,7 @@ class SkinDialog(QDialog):
     def _drawn(self, surface: MeshSurface | None) -> MeshSurface | None:
         return self._read if surface is None else surface
 
-    def _show_faults(self, found: list[MeshFault]) -> None:
+    def _show_faults(self, found: list[MeshFault], may_repair: bool) -> None:
         while (item := self.found.takeAt(0)) is not None:
             if (widget := item.widget()) is not None:
                 widget.hide()
@@ -461,6 +477,7 @@ class SkinDialog(QDialog):
             layout.addWidget(text_label(sentence(fault.message)), 1)
             if fault.repair:
                 repair = button(_REPAIRS[fault.repair], f"repair-{fault.kind}", "The file stays.")
+                repair.setEnabled(may_repair)
                 repair.setAutoDefault(False)  # or Enter in a line would press it
                 repair.clicked.connect(guarded(lambda *_, fault=fault: self._repair(fault)))
                 layout.addWidget(repair, 0, Qt.AlignmentFlag.AlignTop)
@@ -489,9 +506,13 @@ class SkinDialog(QDialog):
             skin["held"] = arc
         title = self.file.stem
         self._making.compute(new_scene, title, self._used.resolve(), skin, self.elements.value())
-        self._show("Computing the functions of the skin: the first time 5 to 30 s, and none later")
+        self._show("Setting up the skin: the first time 10 to 60 s, and none later")
+        self.bar.setValue(0)
 
-    def _finish(self, scene: Written) -> None:
+    def _finish(self, scene: Written | float) -> None:
+        if isinstance(scene, float):
+            self.bar.setValue(round(100 * scene))
+            return
         self._making.stop()
         self.accept()
         self.made.emit(scene)
@@ -554,20 +575,28 @@ def _quoted(value: object) -> str:
     return json.dumps(value, ensure_ascii=False)
 
 
-def new_scene(title: str, file: Path, skin: dict[str, Any], elements: int) -> Written:
-    """A scene of the mesh in `file`, pressed in its middle; computes and stores its functions.
+def new_scene(
+    title: str, file: Path, skin: dict[str, Any], elements: int
+) -> Generator[float | Written]:
+    """A scene of the mesh in `file`, pressed in its middle, after shares done from 0 to 1.
 
-    `skin` is its table, with the path of the file.
+    It computes and stores the mesh's functions, and what elements read of loads. `skin` is its
+    table, with the path of the file.
     """
     at, trust = file.with_suffix(".toml"), frozenset((file,))
+    yield 0.0
     nodes = len(read_surface(file, skin["unit"]).nodes)
     functions = min(_FUNCTIONS, math.isqrt(nodes // _PER_FUNCTION))
     scene = read_scene(_text(title, skin, elements, functions), at, trust)
+    yield _READ
     patch = scene.plate.patch
     if not isinstance(patch, MeshSkin):
         raise TypeError(patch)
     middle = np.array([patch.a, patch.b]) / 2
     x, y = patch.places[np.linalg.norm(patch.places - middle, axis=1).argmin()].tolist()
     disc = DiscLoad(x, y, _RADIUS * min(patch.a, patch.b))
-    load = scaled_to(scene.plate, disc, _DEPTH * patch.thickness, scene.basis)
-    return Written(_text(title, skin, elements, functions, load), at, trust)
+    pressed = scene.plate, disc, _DEPTH * patch.thickness, scene.basis
+    load = yield from with_progress(_READ, _PRESSED, scaled_to, *pressed)
+    read = scene.plate, scene.layout, scene.edge
+    yield from with_progress(_PRESSED, 1.0, PointContact, *read)
+    yield Written(_text(title, skin, elements, functions, load), at, trust)

@@ -7,7 +7,9 @@ from kappaskin_app.features.stability.demonstrations import Demonstrator
 from kappaskin_app.features.stability.observability import Observability
 from kappaskin_app.features.stability.panel import StabilityPanel
 from kappaskin_app.guard import guarded
+from kappaskin_app.shell.selection import SkinMap
 from kappaskin_app.shell.window import MainWindow
+from kappaskin_app.widgets.tint import Tint
 
 _ABOUT = "Observability of the modes by their singular values, and hard cases to try"
 
@@ -50,11 +52,12 @@ class StabilityFeature:
             return  # the last panel hides while the window closes
         spectrum, setup = self.observability.selected(), session.status.setup
         if spectrum is None or not self.stability.on_skin.isChecked():
-            selection.show_mode(None)
+            selection.show_map(None)
             return
         number, count = self.observability.number, len(spectrum.values)
         text = f"Colours: mode {number} of {count}, no measurement"
-        selection.show_mode(spectrum.surface(number, setup.nx, setup.ny), text)
+        values = spectrum.surface(number, setup.nx, setup.ny)
+        selection.show_map(SkinMap(values, Tint("diverging", (-1.0, 1.0), "shape"), text))
 
     def _figure(self, name: str) -> float:
         """A figure for the lessons; NaN while there is none."""

@@ -14,10 +14,13 @@ from kappaskin_app.shell.settings.form_fields import (
 )
 from kappaskin_app.shell.settings.scene import SHAPES, Skin
 
+OPEN = "open"
+"""The outline of the scene that is open."""
 PATTERNS = (("grid", "Grid"), ("rings", "Rings"), ("spiral", "Spiral"))
 PLACINGS = (
-    ("scene", "As the pattern"),
+    ("scene", "As given"),
     ("clustered", "Clustered in the middle"),
+    ("contact", "Best for contacts"),
     ("D", "D-optimal"),
     ("A", "A-optimal"),
 )
@@ -46,8 +49,9 @@ class DesignSettings:
         "flat",
         Choice(
             "Outline",
-            "Outline of the designed skin, which is hinged along its edges; a cap is clamped.",
-            tuple((name, shape.label) for name, shape in SHAPES.items()),
+            "The open scene with its skin of any shape, or a skin to design, which is hinged along "
+            "its edges; a cap is clamped.",
+            ((OPEN, "The open scene"), *((name, shape.label) for name, shape in SHAPES.items())),
         ),
     )
     design_side_x: float = setting(0.1, _length("Side x", "Length of the skin along x."))
@@ -155,10 +159,11 @@ class DesignSettings:
         "scene",
         Choice(
             "Placement",
-            "Positions of the elements. D-optimal maximises det M'M, which minimises the volume of "
-            "the confidence region of the coefficients; A-optimal minimises the mean variance of "
-            "the displacement. Both include noise only; the check by simulation includes the error "
-            "of the basis.",
+            "Positions of the elements. Best for contacts minimises the mean squares of the errors "
+            "of force and place of the load, wherever it can press. D-optimal maximises det M'M, "
+            "which minimises the volume of the confidence region of the coefficients; A-optimal "
+            "minimises the mean variance of the displacement. All include noise only; the check by "
+            "simulation includes the error of the basis.",
             PLACINGS,
         ),
     )

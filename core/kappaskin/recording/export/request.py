@@ -59,7 +59,7 @@ class ExportRequest:
     Times are in s since the recording began: from `begin` until `end`, one frame each `every` s, or
     all where that is 0; or the first frame from `at` on alone. Frames are worked out with the
     settings that were recorded, or with `setup`. A table has the columns of the `preset`, one of
-    `PRESETS`. A `Refusal` where that makes no file.
+    `PRESETS`. It is of one `finger` of a hand. A `Refusal` where that makes no file.
     """
 
     recording: Path
@@ -70,6 +70,7 @@ class ExportRequest:
     at: float | None = None
     setup: Setup | None = None
     preset: str = "contact"
+    finger: str | None = None
 
     def __post_init__(self) -> None:
         if self.preset not in PRESETS:
@@ -244,7 +245,8 @@ def _facts(
     recording: Recording, device: str, sensor: Sensor, setups: list[dict[str, Any]]
 ) -> dict[str, Any]:
     began = datetime.fromtimestamp(recording.first * 1e-9, UTC)
-    return {
+    finger = {"finger": recording.finger} if recording.finger else {}
+    return finger | {
         "program": PROGRAM,
         "revision": REVISION,
         "recording": recording.path.name,

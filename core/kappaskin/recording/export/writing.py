@@ -105,7 +105,7 @@ def _steps(
 ) -> Generator[float | _Result]:
     """Write for so many `seconds` of the processor: shares, and the `result`."""
     try:
-        with Recording(request.recording) as recording:
+        with Recording(request.recording, request.finger) as recording:
             info = recording_info(recording, request)
             with closing(FORMATS[request.format](scratch, request, info)) as writer:
                 work, next_report = _ExportWork(recording, request, info, writer), 0.0

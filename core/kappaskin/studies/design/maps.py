@@ -14,7 +14,7 @@ from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.scenes import Scene
 from kappaskin.skin import MeshSkin, Patch
-from kappaskin.studies.design.measures import PREDICTIONS, Design, Prospect, noise_of, prospect
+from kappaskin.studies.design.measures import PREDICTIONS, Design, Prospect, prospect
 
 Maps = dict[str, dict[str, Prospect]]
 """By the name of a placement, and of what the error is of."""
@@ -28,15 +28,10 @@ _COLOURS: Array = np.array(
 
 
 def design_maps(scene: Scene, functions: tuple[int, int], by: Sequence[str]) -> Maps:
-    """What is predicted of a scene with its elements placed `by` each of some `PLACEMENTS`."""
-    if not noise_of(scene):
-        raise Refusal(
-            "expected noise that counts at the scene's accuracy, to predict errors from, got none "
-            f"in {scene.name}; add or raise [effects.gaussian-noise], or press less hard"
-        )
+    """What is predicted of a scene with its elements placed `by` each of some `PLACED_BY`."""
     found = Maps()
     for name in by:
-        design = Design(scene, functions, name)
+        design = Design(scene, functions, name).placed()
         found[name] = {of: prospect(design, of) for of in PREDICTIONS}
     return found
 

@@ -4,7 +4,7 @@ import math
 import statistics
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from typing import cast
 
 import numpy as np
@@ -20,9 +20,10 @@ from kappaskin.estimation import (
     check_placement,
     estimator_for,
     place_elements,
+    place_for_loads,
     predicted_sd,
 )
-from kappaskin.frames import Array, Contact, Mask, Truth
+from kappaskin.frames import Array, Contact, Indices, Mask, Truth
 from kappaskin.mechanics import DiscLoad, Plate, PointLoad
 from kappaskin.scenes import Indenter, Scene, Simulator, kept_effects, planned
 from kappaskin.sensing import SensorLayout
@@ -216,6 +217,16 @@ def noise_of(scene: Scene) -> float:
     return float(noise[0])
 
 
+def known_noise(scene: Scene) -> float:
+    """As `noise_of`; a `Refusal` where there is none."""
+    if noise := noise_of(scene):
+        return noise
+    raise Refusal(
+        "expected noise that counts at the scene's accuracy, to predict errors from, got none "
+        f"in {scene.name}; add or raise [effects.gaussian-noise], or press less hard"
+    )
+
+
 @lru_cache(8)
 def _predicted_rms(estimator: Estimator, noise: float) -> float:
     patch = estimator.basis.patch
@@ -238,12 +249,18 @@ PressedLoad = PointLoad | DiscLoad
 
 
 def pressed_load(scene: Scene) -> PressedLoad:
-    """The one load of a scene by which errors of contact and force are predicted."""
-    if len(scene.loads) == len(scene.stimuli) == 1:
-        load = scene.loads[0]
-        if isinstance(load, PressedLoad):
-            return load
-    raise Refusal("expected one point or disc that presses, to predict errors of contact and force")
+    """The load of a scene by which errors of contact and force are predicted.
+
+    The first of several that differ in their place alone.
+    """
+    loads = [load for load in scene.loads if isinstance(load, PressedLoad)]
+    alike = {replace(load, x=0.0, y=0.0) for load in loads}
+    if len(alike) == 1 and len(loads) == len(scene.stimuli):
+        return loads[0]
+    raise Refusal(
+        "expected one point or disc that presses, or some alike, to predict errors of contact and "
+        f"force, got {len(scene.stimuli)} stimuli; press with one point or disc"
+    )
 
 
 def _contact_covariance(
@@ -255,12 +272,21 @@ def _contact_covariance(
     """
     if scene.plate.unknown_material:
         raise Refusal("expected a skin of known material to predict a force, got an unknown one")
-    x, y, s = load.x, load.y, load.radius**2 if isinstance(load, DiscLoad) else 0.0
-    found = _point_contact(scene, layout).covariance(x, y, s, load.force, noise)
+    found = _point_contact(scene, layout).covariance(*_pressed(load), load.force, noise)
     to_skin = np.diag([1 / load.force, 1.0, 1.0])
-    if slopes := scene.plate.patch.base(x, y).slopes:
-        to_skin[1:, 1:] = np.linalg.inv(slopes)
+    to_skin[1:, 1:] = _to_skin(scene, load)
     return to_skin @ found @ to_skin.T
+
+
+def _pressed(load: PressedLoad) -> tuple[float, float, float]:
+    """Where a load is in m, and its radius squared in m^2."""
+    return load.x, load.y, load.radius**2 if isinstance(load, DiscLoad) else 0.0
+
+
+def _to_skin(scene: Scene, load: PressedLoad) -> Array:
+    """The map (2, 2) of steps in x and y to those along the frame of the skin under a load."""
+    slopes = scene.plate.patch.base(load.x, load.y).slopes
+    return np.linalg.inv(slopes) if slopes else np.eye(2)
 
 
 def _predicted_contact(block: FrameBlock) -> Array:
@@ -276,6 +302,10 @@ def _predicted_force(block: FrameBlock) -> Array:
 def _covariances(block: FrameBlock) -> Array:
     """The covariances (T, 3, 3) of the block's contacts, by noise alone."""
     load = pressed_load(block.scene)
+    if len(block.scene.stimuli) > 1:
+        raise Refusal(
+            "expected one load, to predict errors in each frame from, got several; leave one"
+        )
     each = zip(block.contact.tolist(), block.forces().tolist(), strict=True)
     loads = [replace(load, x=x, y=y, force=force) for (x, y), force in each]
     layout, noise = block.estimator.layout, noise_of(block.scene)
@@ -326,6 +356,18 @@ _NEAR_RIM = 1 / 15  # of the shorter side: nearer to the rim, no force is report
 _AREA_STEPS = 513
 
 
+PLACED_BY = (*PLACEMENTS, "contact")
+"""Placements by name: those of `PLACEMENTS`, and the one that determines the scene's load best."""
+_LOADS = _PRESSED_SIDE**2  # places of the load at most
+_TOGETHER = 500  # candidates whose readings of a load are computed together
+
+
+def check_name(by: str) -> None:
+    """Raise a `Refusal` for a name that is none of `PLACED_BY`."""
+    if by not in PLACED_BY:
+        raise Refusal(f"expected by among {', '.join(PLACED_BY)}, got {by!r}")
+
+
 def placed_estimator(
     scene: Scene, functions: tuple[int, int], by: str, distance: float, method: str
 ) -> Estimator:
@@ -333,13 +375,41 @@ def placed_estimator(
     patch, (Ni, Nj) = scene.plate.patch, functions
     basis = basis_for(patch, scene.edge, Ni, 1 if patch.strip else Nj)
     sigma = scene.layout.sigma(scene.transduction.noise)
-    layout = place_elements(scene.layout, basis, by, distance, sigma)
+    if by == "contact":
+        layout = place_for_loads(scene.layout, distance, partial(_told_of_loads, scene))
+    else:
+        layout = place_elements(scene.layout, basis, by, distance, sigma)
     return estimator_for(method, basis, layout, sigma)
+
+
+def _told_of_loads(scene: Scene, places: Array) -> tuple[Array, Array, Array]:
+    """What elements at `places` (C, 2) tell of the scene's load all over the skin.
+
+    As `place_for_loads` takes it: of the force as a share and the place along the skin.
+    """
+    load, noise, layout = pressed_load(scene), known_noise(scene), scene.layout
+    seen = _map_of(scene, "contact")
+    some = np.random.default_rng(0).permutation(len(seen.points))[:_LOADS]
+    loads = [replace(load, x=x, y=y) for x, y in seen.points[some].tolist()]
+    told = list[Array]()
+    for part in np.split(places, range(_TOGETHER, len(places), _TOGETHER)):
+        find = _point_contact(scene, layout.read_alike(part))
+        each = [find.information(*_pressed(one), one.force, noise) for one in loads]
+        told.append(np.stack(each, axis=1))
+    information = np.concatenate(told)
+    errors = np.zeros((2, *information.shape[1:]))
+    to_skin = np.array([_to_skin(scene, one) for one in loads])
+    shares = seen.shares[seen.on][some]
+    errors[0, :, 0, 0] = shares
+    errors[1, :, 1:3, 1:3] = shares[:, None, None] * np.swapaxes(to_skin, 1, 2) @ to_skin
+    known = np.zeros(information.shape[2:])
+    known[-1, -1] = 1.0  # of the profile
+    return information, known, errors
 
 
 @dataclass(frozen=True)
 class Design:
-    """A `scene` with its elements placed `by` one of `PLACEMENTS`.
+    """A `scene` with its elements placed `by` one of `PLACED_BY`.
 
     Shapes are reconstructed by least squares with Ni x Nj `functions`.
     """
@@ -349,8 +419,7 @@ class Design:
     by: str = "scene"
 
     def __post_init__(self) -> None:
-        if self.by not in PLACEMENTS:
-            raise Refusal(f"expected by among {', '.join(PLACEMENTS)}, got {self.by!r}")
+        check_name(self.by)
 
     def estimator(self) -> Estimator:
         """The estimator with the elements placed; raises a `Refusal` where they cannot be."""
@@ -358,6 +427,11 @@ class Design:
         check_placement(layout, self.by)
         spacing = _SPACING * math.sqrt(_area(self.scene.plate.patch) / len(layout))
         return placed_estimator(self.scene, self.functions, self.by, spacing, "least-squares")
+
+    def placed(self) -> "Design":
+        """The same with the elements of its scene where they are placed."""
+        layout = self.estimator().layout
+        return replace(self, scene=replace(self.scene, layout=layout), by="scene")
 
 
 def _area(patch: Patch) -> float:
@@ -388,9 +462,10 @@ class _Map:
     def of(cls, patch: Patch, side: int, margin: float = -math.inf) -> "_Map":
         """`side` x `side` points of a `patch`, or nodes, at least `margin` in m from its rim."""
         if isinstance(patch, MeshSkin):
-            places, shares = patch.places, patch.areas / patch.areas.sum()
+            places = patch.places
             on = patch.depth(places) >= margin
-            return cls(places[:, 0], places[:, 1], places, on, np.where(on, shares, 0.0))
+            shares = np.where(on, patch.areas, 0.0)
+            return cls(places[:, 0], places[:, 1], places, on, shares / shares.sum())
         x, y = patch.grid(side, 2 if patch.strip else side)
         places = np.stack(np.meshgrid(x, y), axis=-1)
         points = places.reshape(-1, 2)
@@ -438,6 +513,25 @@ class Prospect:
     of: str = PREDICTIONS[0]
     load: PressedLoad | None = None
 
+    def surface(self, patch: Patch, nx: int, ny: int, sd: Array | None = None) -> Array:
+        """The error, or an `sd` of a check, between its points on a grid (ny, nx) of the `patch`.
+
+        NaN where none is predicted.
+        """
+        from scipy.interpolate import LinearNDInterpolator  # needed by few
+
+        points = np.stack(np.meshgrid(*patch.grid(nx, ny)), axis=-1).reshape(-1, 2)
+        places = np.column_stack([self.x, self.y])
+        if self.sd.ndim > 1:
+            places = np.stack(np.meshgrid(self.x, self.y), axis=-1).reshape(-1, 2)
+        values = (self.sd if sd is None else sd).ravel()
+        known = np.isfinite(values)
+        found: Array = LinearNDInterpolator(places[known], values[known])(points)
+        near = values[known][_nearest(places[known], points)]
+        predicted = np.isfinite(self.sd.ravel())[_nearest(places, points)]
+        found = np.where(np.isfinite(found), found, near)
+        return np.where(predicted & patch.contains(points), found, np.nan).reshape(ny, nx)
+
     @property
     def rms(self) -> float:
         """The square root of the mean variance over the skin."""
@@ -455,6 +549,11 @@ class Prospect:
     def worst(self) -> float:
         """The largest on the skin."""
         return float(np.nanmax(self.sd))
+
+
+def _nearest(places: Array, points: Array) -> Indices:
+    """The numbers of the `places` that are nearest to each of the `points`."""
+    return np.asarray(scipy.spatial.KDTree(places).query(points)[1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -504,7 +603,7 @@ def _map_of(scene: Scene, of: str) -> _Map:
 def prospect(design: Design, of: str = "displacement") -> Prospect:
     """The error of one of `PREDICTIONS` by the covariance of a design, without a simulation."""
     estimator, scene, seen = design.estimator(), design.scene, _map_of(design.scene, of)
-    layout, noise = estimator.layout, noise_of(scene)
+    layout, noise = estimator.layout, known_noise(scene)
     if of == "displacement":
         sd = predicted_sd(estimator, noise, seen.points)
     else:

@@ -20,12 +20,11 @@ from kappaskin._toml import TomlTable, parsed
 from kappaskin.errors import Refusal
 from kappaskin.estimation import (
     METHODS,
-    PLACEMENTS,
     Estimator,
     check_placement,
 )
 from kappaskin.scenes import Scene, read_scene_text, scene_of
-from kappaskin.studies.design.measures import MEASURES, placed_estimator
+from kappaskin.studies.design.measures import MEASURES, check_name, placed_estimator
 
 # Dotted places of values in a file
 
@@ -304,14 +303,13 @@ class FitSettings:
 
 @dataclass(frozen=True)
 class PlacementSettings:
-    """Where the elements are: `by` one of `PLACEMENTS`, at least `apart` in m from each other."""
+    """Where the elements are: `by` one of `PLACED_BY`, at least `apart` in m from each other."""
 
     by: str = "scene"
     apart: float = 4e-3
 
     def __post_init__(self) -> None:
-        if self.by not in PLACEMENTS:
-            raise Refusal(f"expected by among {', '.join(PLACEMENTS)}, got {self.by!r}")
+        check_name(self.by)
         if not 0 < self.apart < 1:
             raise Refusal(f"expected a distance between elements above zero in m, got {self}")
 

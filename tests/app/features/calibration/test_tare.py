@@ -42,7 +42,9 @@ class Bench:
         self.history = History(Settings(**settings))
         self.tares = TareStore(folder)
         self.engine = SimpleNamespace(tare=self.ask, source="/dev/ttyACM0")
-        self.tare_controller = TareController(self.history, cast(Any, self.engine), self.tares)
+        self.tare_controller = TareController(
+            self.history, cast(Any, SimpleNamespace(engine=self.engine)), self.tares
+        )
         self.tare_controller.reported.connect(self.reported.append)
         self.panel = TarePanel()
         self.panel.connect_to(self.tare_controller)

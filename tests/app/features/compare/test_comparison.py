@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kappaskin import Setup
+from kappaskin import Setup, load_scene
 from kappaskin.pipeline import Readout
 from kappaskin_app.features.compare.comparison import Pair, other_setup
-from kappaskin_app.features.compare.panel import difference_text
+from kappaskin_app.features.compare.panel import OtherForm, difference_text
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.window import MainWindow
 
@@ -151,3 +151,17 @@ def test_nothing_is_blank(window: MainWindow, pairs: list[Pair], until, colours_
     until(lambda: len(pairs) > 3)
     for view in window.compare.maps.values():
         assert colours_in(window, view.map) > 30
+
+
+def test_the_functions_of_b_are_named_by_the_skin(qtbot) -> None:
+    form = OtherForm()
+    qtbot.addWidget(form)
+
+    def names() -> list[str]:
+        each = (form.form.itemAt(row, form.form.ItemRole.LabelRole) for row in (0, 1))
+        return [item.widget().text() for item in each]
+
+    form.show_pipeline(None, load_scene("thumb-pad").sensor())
+    assert names() == ["Functions, N =", "\N{MULTIPLICATION SIGN}"]
+    form.show_pipeline(None, load_scene("circle").sensor())
+    assert names() == ["Basis functions in x", "Basis functions in y"]

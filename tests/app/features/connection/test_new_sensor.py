@@ -13,7 +13,7 @@ import pytest
 from mcap.writer import Writer
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QFileDialog
+from PySide6.QtWidgets import QFileDialog, QLabel
 
 from kappaskin.sources import Recogniser, load_description
 from kappaskin_app.features.connection.wizard import NewSensorDialog
@@ -410,3 +410,8 @@ def test_the_source_whose_port_was_read_is_connected_again(
     until(lambda: window.display.badge.state == "OFF")
     QTest.keyClick(dialog, Qt.Key.Key_Escape)
     until(lambda: window.display.badge.state == "LIVE")
+
+
+def test_other_skins_than_rectangles_are_told_where_they_are_made(dialog) -> None:
+    said = [label.text() for label in dialog.findChildren(QLabel) if label.objectName() == "hint"]
+    assert any("mesh" in words and "Your own sensor" in words for words in said)

@@ -10,20 +10,24 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QApplication, QFileDialog
 
-from kappaskin import load_scene, write_scene
+from kappaskin import Plate, Scene, SensorLayout, load_scene, write_scene
 from kappaskin.errors import Refusal
+from kappaskin.mechanics import DiscLoad
 from kappaskin.scenes import read_scene
+from kappaskin.scenes.effects import GaussianNoise
+from kappaskin.skin import MeshSkin
 from kappaskin.studies import prospect
-from kappaskin_app.features.design.panel import DesignForm, _place, _value_at
-from kappaskin_app.features.design.prediction import design_of, scene_of
+from kappaskin_app.features.design.panel import DesignForm, _place, _value_at, skin_map
+from kappaskin_app.features.design.prediction import _checks, _prospect, design_of, scene_of
 from kappaskin_app.shell.settings import Settings, form_field
 from kappaskin_app.shell.settings.designed import DesignSettings
 from kappaskin_app.shell.settings.form_fields import Range
-from kappaskin_app.shell.settings.scene import SHAPES
+from kappaskin_app.shell.settings.scene import SHAPES, Written
 from kappaskin_app.shell.simulation import with_consequences
 from kappaskin_app.shell.window import MainWindow
 from kappaskin_app.theme import DARK, apply_look
 from kappaskin_app.widgets.surface_map import SurfaceMap
+from meshes import ellipsoid
 
 RANGES = [n for n in DesignSettings.__dataclass_fields__ if isinstance(form_field(n), Range)]
 
@@ -169,6 +173,66 @@ def test_a_design_is_predicted_checked_undone_and_saved(
     np.testing.assert_allclose(
         load_scene(str(file)).layout.positions, prediction.prospect.positions, atol=1e-9
     )
+
+
+def opened_pad() -> Settings:
+    """The settings with a small mesh open that a disc presses."""
+    mesh = MeshSkin(*ellipsoid(17, (9e-3, 7e-3, 6e-3), math.radians(70)), 1e-3)
+    plate, layout = Plate(mesh, 1e-3), SensorLayout.spread(mesh, 20)
+    scene = Scene("pad", plate, layout, effects=(GaussianNoise(0.3),), edge="clamped")
+    scene = scene.touched_by(DiscLoad(mesh.a / 2, mesh.b / 2, 1e-3, 0.1))
+    return replace(Settings(), written=Written(write_scene(scene), Path("pad.toml")))
+
+
+OPENED = {"design_shape": "open", "design_functions_x": 4, "design_functions_y": 3}
+
+
+def test_the_open_scene_is_designed_on_its_mesh_with_its_noise_and_load(qtbot) -> None:
+    settings = replace(opened_pad(), **OPENED, design_map="contact", design_place="contact")
+
+    placed, found = _prospect(settings)
+
+    mesh = placed.scene.plate.patch
+    assert found.sd.shape == (len(mesh.nodes),)
+    assert (len(found.positions), found.load.radius) == (20, 1e-3)
+    assert found.rms < prospect(design_of(replace(settings, design_place="scene")), "contact").rms
+    shown = skin_map(placed, found, 31, 25)
+    assert shown.values.shape == (25, 31)
+    assert shown.tint.limits[0] <= np.nanmin(shown.values) < np.nanmax(shown.values)
+    assert np.nanmax(shown.values) <= shown.tint.limits[1]
+    assert (shown.tint.unit, shown.label) == ("mm", "RMS error of the place")
+    pressed = next(_checks(placed, "contact"))
+    checked = found.surface(mesh, 31, 25, pressed.sd)
+    np.testing.assert_array_equal(np.isfinite(checked), np.isfinite(shown.values))
+    written = read_scene(write_scene(placed.scene), Path("a.toml"))
+    np.testing.assert_allclose(written.layout.positions, found.positions, atol=1e-9)
+    form = DesignForm()
+    qtbot.addWidget(form)
+    form.show()
+    form.show_settings(settings)
+    rows = {name for name in DesignSettings.__dataclass_fields__ if form.has_row(name)}
+    assert rows == {*OPENED, "design_map", "design_place"}
+
+
+@pytest.mark.full
+def test_the_map_of_the_open_scene_colours_the_skin_while_the_panel_is_visible(
+    window: MainWindow, until
+) -> None:
+    prediction, selection = window.prediction, window.selection
+    window.docks.reveal("design")
+    window.history.change("pad", -1, written=opened_pad().written, design_map="force", **OPENED)
+    until(lambda: selection.map is not None, 120)
+    until(lambda: window.scale.bar.limits == selection.map.tint.limits)
+
+    assert window.membrane.caption.input.startswith("Colours: RMS error of the force under 0.1 N")
+    assert selection.map.tint.unit == window.design.predicted.unit == "%"
+    np.testing.assert_array_equal(selection.map.positions, prediction.prospect.positions)
+    window.design.on_skin.setChecked(False)
+    assert selection.map is None
+    window.design.on_skin.setChecked(True)
+    assert selection.map is not None
+    window.docks["design"].hide()
+    until(lambda: selection.map is None)
 
 
 @pytest.mark.full

@@ -1,22 +1,23 @@
 """Open skin: what is asked, shown, mended and made of a mesh file."""
 
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
-from PySide6.QtWidgets import QPushButton
+from PySide6.QtWidgets import QLabel, QPushButton
 
-from kappaskin import read_scene
+from kappaskin import Refusal, read_scene
 from kappaskin.scenes import scene_file
 from kappaskin.skin import MeshSkin, read_surface
 from kappaskin_app.features.scene.scene_text import named
 from kappaskin_app.features.scene.skin_dialog import SkinDialog, new_scene
 from kappaskin_app.shell.background import Tasks
-from meshes import ellipsoid
+from meshes import ellipsoid, obj
 
 LEFT = Qt.MouseButton.LeftButton
-PAD = ellipsoid(12, (9.0, 7.0, 6.0), 1.2)
+PAD = ellipsoid(16, (9.0, 7.0, 6.0), 1.2)
 KIND = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
@@ -75,7 +76,7 @@ def test_the_unit_is_asked_for_with_the_size_in_each(dialog, until, qtbot, pad) 
 
     texts = [dialog.unit.itemText(k) for k in range(dialog.unit.count())]
     assert texts[1:] == [
-        "m: the skin is 1.68e+04 x 1.3e+04 x 3.83e+03 mm",
+        "m: the skin is 16,800 x 13,000 x 3,830 mm",
         "cm: the skin is 168 x 130 x 38.3 mm",
         "mm: the skin is 16.8 x 13 x 3.83 mm",
         "inch: the skin is 426 x 331 x 97.2 mm",
@@ -114,7 +115,7 @@ def test_repairs_are_made_one_by_one_when_clicked(dialog, until, qtbot, broken) 
 def test_two_clicks_on_the_rim_hold_the_part_between_them(dialog, until, qtbot, pad) -> None:
     opened(dialog, until, qtbot, pad)
     dialog.resize(900, 600)
-    assert len(dialog.preview.held) == 72
+    assert len(dialog.preview.held) == 96
     for place in ((5.0, -5.0), (5.0, 5.0)):
         surface = dialog.preview.surface
         nodes = np.unique(surface.rim)
@@ -123,7 +124,7 @@ def test_two_clicks_on_the_rim_hold_the_part_between_them(dialog, until, qtbot, 
         qtbot.mouseClick(dialog.preview, LEFT, pos=QPoint(round(x), round(y)))
 
     held = dialog.preview.held
-    assert 10 < len(held) < 36
+    assert 10 < len(held) < 48
     assert surface.nodes[held][..., 0].min() > 3e-3
     assert dialog.begin_button.isEnabled()
     dialog.ends[1].selectAll()
@@ -182,8 +183,11 @@ def test_computing_can_be_cancelled(dialog, until, qtbot, pad) -> None:
     assert dialog.cancel_button.text() == "&Cancel"
     assert not dialog.unit.isEnabled()
     assert not dialog.bar.isHidden()
+    assert (dialog.bar.value(), dialog.bar.maximum()) == (0, 100)
+    begin = time.monotonic()
     qtbot.mouseClick(dialog.cancel_button, LEFT)
 
+    assert time.monotonic() - begin < 1
     assert dialog.message.text() == "Cancelled; nothing is simulated."
     assert dialog.begin_button.isEnabled()
     assert dialog.isVisible()
@@ -192,7 +196,11 @@ def test_computing_can_be_cancelled(dialog, until, qtbot, pad) -> None:
 
 def test_the_scene_of_a_mesh_presses_its_middle(pad, tmp_path, monkeypatch) -> None:
     skin = {"shape": "mesh", "file": str(pad), "unit": "mm", "thickness": 1e-3, "rigidity": 3e-4}
-    written = new_scene("My pad", pad, skin, 40)
+    *shares, written = new_scene("My pad", pad, skin, 40)
+
+    assert shares == sorted(shares)
+    assert len(shares) > 10
+    assert (shares[0], shares[-1] > 0.9) == (0.0, True)
 
     scene = read_scene(written.text, written.file, written.trust)
     assert scene.title == "My pad"
@@ -234,3 +242,76 @@ def test_a_mesh_that_is_dropped_is_opened_as_a_skin_and_simulated(
     repaired = read_surface(Path(name), "mm")
     assert Path(name) != broken
     assert len(repaired.triangles) == len(PAD[1])
+
+
+def test_triangles_too_large_to_find_contacts_are_refused_before_the_scene(tmp_path) -> None:
+    coarse = stl(tmp_path / "coarse.stl", *ellipsoid(10, (9.0, 7.0, 6.0), 1.2))
+    skin = {"shape": "mesh", "file": str(coarse), "unit": "mm", "thickness": 1e-3}
+    with pytest.raises(Refusal, match=r"too thin for its radii .* or use smaller triangles"):
+        list(new_scene("Coarse", coarse, skin | {"rigidity": 3e-4}, 40))
+
+
+@pytest.fixture
+def fine(tmp_path):
+    """A mesh of 130,000 triangles, more than a skin may have."""
+    n = 256
+    x, y = np.meshgrid(np.linspace(-1, 1, n), np.linspace(-1, 1, n))
+    k = np.arange(n * n).reshape(n, n)
+    a, b, c, d = (k.ravel() for k in (k[:-1, :-1], k[:-1, 1:], k[1:, 1:], k[1:, :-1]))
+    nodes = np.column_stack([9 * x.ravel(), 7 * y.ravel(), 2 - (x**2 + y**2).ravel()])
+    triangles = np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
+    return stl(tmp_path / "fine.stl", nodes, triangles)
+
+
+def test_a_repair_of_many_triangles_is_begun_once_and_leaves_the_window_its_time(
+    dialog, until, qtbot, fine
+) -> None:
+    opened(dialog, until, qtbot, fine)
+    assert [b.text() for b in repairs(dialog)] == ["&Decimate"]
+    qtbot.mouseClick(repairs(dialog)[0], LEFT)
+    until(lambda: bool(repairs(dialog)))
+    assert not repairs(dialog)[0].isEnabled()
+    assert dialog.message.text() == "Repairing\N{HORIZONTAL ELLIPSIS}"
+    begin = time.monotonic()
+    dialog.reject()
+    assert time.monotonic() - begin < 1
+    assert fine.stat().st_size > 6_000_000
+
+
+def test_a_letter_named_as_a_mesh_is_told_by_its_first_words(dialog, until, tmp_path) -> None:
+    file = tmp_path / "letter.stl"
+    file.write_text("Dear all,\nthis is a letter.\n" * 50)
+    dialog.begin(file)
+    until(lambda: "another text, 'Dear all," in dialog.message.text())
+
+
+@pytest.mark.parametrize("scale", [1.0, 1 / 25.4], ids=["mm", "inch"])
+@pytest.mark.parametrize("kind", ["obj", "ply"])
+def test_other_files_have_the_size_of_their_unit(dialog, until, tmp_path, kind, scale) -> None:
+    nodes, triangles = PAD[0] * scale, PAD[1]
+    file = tmp_path / f"pad.{kind}"
+    text = obj(nodes, triangles)
+    if kind == "ply":
+        lines = [f"{len(nodes)}", *("property float " + axis for axis in "xyz")]
+        head = ["ply", "format ascii 1.0", f"element vertex {lines[0]}", *lines[1:]]
+        head += [f"element face {len(triangles)}", "property list uchar int vertex_indices"]
+        rows = [f"{x} {y} {z}" for x, y, z in nodes.tolist()]
+        rows += [f"3 {a} {b} {c}" for a, b, c in triangles.tolist()]
+        text = "\n".join([*head, "end_header", *rows, ""])
+    file.write_text(text)
+    dialog.begin(file)
+    until(lambda: dialog.unit.count() > 1)
+    texts = [dialog.unit.itemText(k) for k in range(dialog.unit.count())]
+    assert texts[3 if scale == 1 else 4].endswith("the skin is 16.8 x 13 x 3.83 mm")
+
+
+def test_a_mesh_with_a_hole_has_no_repair(dialog, until, qtbot, tmp_path) -> None:
+    nodes, triangles = PAD
+    away = np.linalg.norm(nodes[triangles].mean(axis=1)[:, :2] - (2, 1), axis=1)
+    dialog.begin(stl(tmp_path / "hole.stl", nodes, triangles[away > 1.2]))
+    until(lambda: dialog.unit.count() > 1)
+    qtbot.keyClicks(dialog.unit, "mm")
+    until(lambda: "Repair the faults" in dialog.message.text())
+    assert not repairs(dialog)
+    assert not dialog.begin_button.isEnabled()
+    assert any("fill the holes" in label.text() for label in dialog.findChildren(QLabel))

@@ -10,9 +10,10 @@ import pytest
 from kappaskin import Plate, Refusal, Scene, SensorLayout
 from kappaskin.bases import basis_for
 from kappaskin.cli import main
+from kappaskin.contact import PointContact
 from kappaskin.estimation import place_elements
 from kappaskin.mechanics import DiscLoad
-from kappaskin.scenes import write_scene
+from kappaskin.scenes import Stimulus, write_scene
 from kappaskin.scenes.effects import GaussianNoise
 from kappaskin.skin import MeshSkin
 from kappaskin.studies import Design, design_maps, prospect, write_maps
@@ -106,3 +107,58 @@ def test_a_file_of_another_kind_or_no_noise_is_refused(scene, maps, tmp_path):
         write_maps(tmp_path / "felt.txt", scene.plate.patch, maps)
     with pytest.raises(Refusal, match="noise that counts"):
         design_maps(replace(scene, effects=()), (6, 6), ("scene",))
+
+
+def test_elements_placed_for_contacts_determine_force_and_place_better(scene, maps):
+    placed = design_maps(scene, (6, 6), ("contact",))["contact"]
+
+    assert len(placed["contact"].positions) == 30
+    left = {by: [placed[of].rms / maps[by][of].rms for of in ("contact", "force")] for by in maps}
+    assert max(*left["A"], *left["scene"]) < 1
+    assert np.sum(np.square(left["scene"])) < 2 * 0.92
+
+
+def test_what_elements_tell_of_a_load_adds_up_to_its_covariance(scene):
+    load, noise = scene.loads[0], 3.0  # so much that no reading is taken for inexact
+    find = PointContact(scene.plate, scene.layout, scene.edge)
+    about = load.x, load.y, load.radius**2, load.force, noise
+
+    W = find.information(*about).sum(axis=0)
+    W[-1, -1] += 1.0
+    force = np.array([load.force, 1.0, 1.0])
+    found = np.linalg.inv(W)[:3, :3] * np.multiply.outer(force, force)
+
+    np.testing.assert_allclose(found, find.covariance(*about), rtol=1e-2, atol=1e-12)
+
+
+def test_an_error_has_a_median_where_most_of_the_skin_is_near_its_rim(scene):
+    wide = scene.touched_by(replace(scene.loads[0], radius=2.2e-3))
+    found = prospect(Design(wide, (6, 6)), "contact")
+
+    assert np.isfinite(found.sd).sum() < 0.4 * len(found.sd)
+    assert np.nanmin(found.sd) < found.median < found.worst
+
+
+def test_errors_on_a_grid_are_those_between_the_nodes(scene, maps):
+    mesh, found = scene.plate.patch, maps["scene"]["contact"]
+    linear = replace(found, sd=np.where(np.isfinite(found.sd), 1.0 + 50 * found.x, np.nan))
+
+    grid = linear.surface(mesh, 41, 31)
+
+    x, y = np.meshgrid(*mesh.grid(41, 31))
+    known, depth = np.isfinite(grid), mesh.depth(np.stack([x, y], -1).reshape(-1, 2))
+    inside = depth.reshape(x.shape) > 1.5e-3
+    np.testing.assert_allclose(grid[inside], 1 + 50 * x[inside], rtol=1e-9)
+    np.testing.assert_allclose(grid[known], 1 + 50 * x[known], atol=0.03)
+    assert not known.ravel()[depth < 0.5e-3].any()
+
+
+def test_a_scene_of_several_loads_alike_is_predicted_as_with_one(scene, maps):
+    first = scene.loads[0]
+    touches = (Stimulus(first), Stimulus(replace(first, x=first.x + 1e-3)))
+    other = (touches[0], Stimulus(replace(first, force=0.2)))
+
+    found = prospect(Design(replace(scene, stimuli=touches), (6, 6)), "force")
+    assert found.rms == maps["scene"]["force"].rms
+    with pytest.raises(Refusal, match="some alike"):
+        prospect(Design(replace(scene, stimuli=other), (6, 6)), "force")

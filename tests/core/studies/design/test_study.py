@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 
 from kappaskin import Refusal
-from kappaskin.estimation import PLACEMENTS
 from kappaskin.studies import load_study
-from kappaskin.studies.design.measures import MEASURES
+from kappaskin.studies.design.measures import MEASURES, PLACED_BY
 from kappaskin.studies.design.study import (
     KINDS,
     STUDIES,
@@ -243,7 +242,7 @@ def test_some_are_different_ones_each_as_often_as_the_others():
 def test_the_guide_names_all_that_a_study_may_say():
     guide = (Path(str(files("kappaskin_resources"))) / "studies" / "README.md").read_text("utf-8")
 
-    for name in (*MEASURES, *KINDS, *PLACEMENTS):
+    for name in (*MEASURES, *KINDS, *PLACED_BY):
         assert f"`{name}`" in guide or name == "scene"
     for kind in (FitSettings, PlacementSettings, MeasureSettings, Stop):
         for field in fields(kind):
