@@ -346,11 +346,6 @@ class MeshSkin(Polygon):
         each = [self.splines.design(positions, *order) @ self._surface for order in _ORDERS]
         return np.stack(each)
 
-    @property
-    def most_functions(self) -> int:
-        """How many functions it has nodes for."""
-        return len(self.points) // 4  # two loads for each, of two nodes each
-
     def jet(self, x: float, y: float) -> Array:
         """Derivatives (6, 3) of the point in space at one place in m, as of splines."""
         return self.splines.jet(self._surface, x, y)
