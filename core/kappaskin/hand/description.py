@@ -15,6 +15,7 @@ from kappaskin._toml import TomlTable, json_table, parsed
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.scenes import Trust, named_file
+from kappaskin.sources import is_finger
 
 FORMAT = 1
 _LARGEST = 2**22  # bytes of a hand's file or of a URDF
@@ -243,6 +244,11 @@ class HandDescription:
                 f"expected 1 to {_MOST_FINGERS} fingers of different names, got {names!r:.200}"
             )
         for finger in self.fingers:
+            if not is_finger(finger.name):
+                raise Refusal(
+                    "expected a finger's name to be a letter, then letters, digits and _, 32 at "
+                    f"most, got {finger.name!r:.60}; change it"
+                )
             if finger.link and (self.linkage is None or finger.link not in self.linkage):
                 raise Refusal(
                     f"expected a link of the hand's URDF for finger {finger.name!r}, got "

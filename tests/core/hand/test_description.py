@@ -122,6 +122,7 @@ def test_a_urdf_with_an_error_is_refused(was, now, why):
     [
         ("format = 2\n" + FINGER, "line 1: format: expected format = 1, got 2"),
         ("format = 1", "expected 1 to 64 fingers of different names"),
+        ("format = 1\n" + FINGER.replace("index", "in/dex"), "a letter, then .* got 'in/dex'"),
         ("format = 1\n" + 2 * FINGER, "fingers of different names, got .'index', 'index'"),
         ("format = 1\n" + FINGER + 'link = "tip"', "expected a link of the hand's URDF for finger"),
         (
