@@ -1,4 +1,4 @@
-"""The house keeps its order: sixteen rooms, no circles, and its counts."""
+"""The house keeps its order: seventeen rooms, no circles, and its counts."""
 
 import ast
 from collections import Counter, defaultdict
@@ -12,7 +12,8 @@ import pytest
 ROOT = Path(__file__).parents[1]
 PACKAGES = {"kappaskin": ROOT / "core" / "kappaskin", "kappaskin_app": ROOT / "app/kappaskin_app"}
 ROOMS = (
-    *("cli", "studies", "live", "publish", "recording", "pipeline", "calibration", "health"),
+    *("cli", "studies", "live", "publish", "recording", "hand", "pipeline", "calibration"),
+    "health",
     *("sources", "scenes", "contact", "estimation", "sensing", "mechanics", "bases", "skin"),
 )
 
@@ -27,7 +28,8 @@ LIMITS = {
     # The strip chart. mechanics: caps.
     # skin: meshes and their files; bases: finite elements of shells, functions on meshes; the app's
     # dialog of a mesh. The hand in the window.
-    "modules": 360,
+    # hand: its description, contacts in its frame, what it holds, how that moves.
+    "modules": 365,
     # Shells and plates that stretch, a load's size, slopes on shells, revisions of estimates;
     # ovals beside objects, and whether an object fits; errors told beforehand, of calibrations on
     # other paths, and of effects that act on one another.
@@ -54,7 +56,8 @@ LIMITS = {
     # functions, contacts and designs on them; the dialog that opens one; glTF of every skin.
     # Several fingers at once: a recording of all by a process of its own, commands for each; the
     # hand in the window. Meshes held in part, elements placed by contacts, patches along a mesh.
-    "statements": 49_400,
+    # Hands of several skins: their description, URDF, the object that they hold, rolling, its map.
+    "statements": 50_100,
     # _files: one way to read and write files; _text: text from outside; _plugins: what other
     # packages add. For all rooms and the app.
     "loose modules of core": 11,
@@ -217,7 +220,7 @@ def test_every_painter_ends_with_its_block() -> None:
     assert calls <= blocks
 
 
-def test_core_is_sixteen_rooms() -> None:
+def test_core_is_seventeen_rooms() -> None:
     folders = {file.parent.name for file in PACKAGES["kappaskin"].glob("*/__init__.py")}
     assert folders == set(ROOMS)
 

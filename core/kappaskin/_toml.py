@@ -45,16 +45,16 @@ def _names(dotted: str) -> list[str]:
     return [name.strip().strip("\"'") for name in dotted.split(".")]
 
 
-def parsed(text: str, file: Path) -> dict[str, Any]:
-    """What the TOML `text`, of `file`, says."""
+def parsed(text: str, file: Path, what: str = "a scene") -> dict[str, Any]:
+    """What the TOML `text` of `file`, which is to be `what`, says."""
     try:
         if _DEEP_TABLES.search(text):
             raise RecursionError
         return tomllib.loads(text)
     except ValueError as error:  # a whole number of thousands of digits is one of these, too
-        raise Refusal(f"{file}: expected a scene in TOML, got an error in it: {error}") from error
+        raise Refusal(f"{file}: expected {what} in TOML, got an error in it: {error}") from error
     except RecursionError as error:
-        raise Refusal(f"{file}: expected a scene, got tables or lists nested too deep") from error
+        raise Refusal(f"{file}: expected {what}, got tables or lists nested too deep") from error
 
 
 def json_table(text: str, floats_may_be_whole: bool = False) -> "TomlTable":

@@ -142,8 +142,8 @@ def read_scene(text: str, file: Path, trust: Trust = False) -> Scene:
     return scene_of(TomlTable(parsed(text, file), text, str(file)), file, trust)
 
 
-def named_file(name: str, folder: Path, trust: Trust = False) -> Path:
-    """The path, without links, of the file that a scene in `folder` calls `name`.
+def named_file(name: str, folder: Path, trust: Trust = False, of: str = "scene") -> Path:
+    """The path, without links, of the file that a scene, or what it is `of`, in `folder` names.
 
     A `Refusal` where it is not in the folder, unless there is `trust`: `name` must be relative,
     without .., and no link may lead out.
@@ -156,8 +156,8 @@ def named_file(name: str, folder: Path, trust: Trust = False) -> Path:
     plain = not Path(name).is_absolute() and ".." not in Path(name).parts
     if not (trusted or (plain and path.is_relative_to(inside))):
         raise Refusal(
-            "expected the name of a file in the folder of the scene, without a link out of it, got "
-            f"{name!r:.200}; copy the file there, or give --trust if you trust the scene"
+            f"expected the name of a file in the folder of the {of}, without a link out of it, got "
+            f"{name!r:.200}; copy the file there, or give --trust if you trust the {of}"
         )
     return path
 

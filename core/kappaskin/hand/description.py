@@ -1,0 +1,357 @@
+"""A hand: the sensors of its fingers, and where each skin is in the hand's frame."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+from xml.etree import ElementTree
+
+import numpy as np
+
+from kappaskin._files import read_file
+from kappaskin._schema import Key, Part, Unit, Within
+from kappaskin._toml import TomlTable, json_table, parsed
+from kappaskin.errors import Refusal
+from kappaskin.frames import Array
+from kappaskin.scenes import Trust, named_file
+from kappaskin.sources import is_finger
+
+FORMAT = 1
+_LARGEST = 2**22  # bytes of a hand's file or of a URDF
+_MOST_FINGERS = 64
+_FIXED, _TURNS, _SLIDES = ("fixed",), ("revolute", "continuous"), ("prismatic",)
+
+Triple = tuple[float, float, float]
+Angles = Mapping[str, float]
+
+
+class Placement(NamedTuple):
+    """Where a frame is in another: points x of it are at `rotation` x + `position`.
+
+    `rotation` (3, 3) is orthonormal, `position` (3,) in m.
+    """
+
+    rotation: Array
+    position: Array
+
+    def of(self, inner: "Placement") -> "Placement":
+        """Where a frame is that is at `inner` in this one."""
+        return Placement(
+            self.rotation @ inner.rotation, self.rotation @ inner.position + self.position
+        )
+
+
+IDENTITY = Placement(np.eye(3), np.zeros(3))
+
+
+def placement(position: Triple, rotation: Triple) -> Placement:
+    """The placement at `position` in m, turned by `rotation` in rad: roll, pitch and yaw.
+
+    About the fixed axes x, then y, then z, as URDF has it.
+    """
+    (a, b, c), (d, e, f) = np.cos(rotation), np.sin(rotation)
+    R = [
+        [c * b, c * e * d - f * a, c * e * a + f * d],
+        [f * b, f * e * d + c * a, f * e * a - c * d],
+        [-e, b * d, b * a],
+    ]
+    return Placement(np.array(R), np.array(position, float))
+
+
+def rotation_about(axis: Array, angle: float) -> Array:
+    """The rotation (3, 3) by `angle` in rad about the unit vector `axis` (3,)."""
+    x, y, z = axis
+    across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + math.sin(angle) * across + 2 * math.sin(angle / 2) ** 2 * across @ across
+
+
+@dataclass(frozen=True)
+class Finger:
+    """A finger: the `source` of its frames, and where its skin's frame is.
+
+    At `position` in m, turned by `rotation` in rad as `placement` has it, in the frame of the
+    `link` of the hand's URDF, or of the hand where that is empty. These are uncertain by
+    `position_sd` in m and `rotation_sd` in rad along and about each axis. The skin `conforms` where
+    it takes the shape of what touches it, as a soft pad does: then its curvature at the contact is
+    the object's.
+    """
+
+    name: str
+    source: str
+    position: Triple
+    rotation: Triple = (0.0, 0.0, 0.0)
+    link: str = ""
+    position_sd: float = 0.0
+    rotation_sd: float = 0.0
+    conforms: bool = False
+
+
+class Joint(NamedTuple):
+    """A joint of a URDF, between the links `parent` and `child`, along or about `axis` (3,).
+
+    Its value is `scale` times that of the joint `of`, plus `offset`: of itself, or of the one it
+    mimics.
+    """
+
+    parent: str
+    kind: str
+    origin: Placement
+    axis: Array
+    limits: tuple[float, float]
+    of: str
+    scale: float
+    offset: float
+
+    def at(self, value: float) -> Placement:
+        """The placement of the child in the parent at `value`, in rad or m."""
+        if self.kind in _TURNS:
+            return self.origin.of(Placement(rotation_about(self.axis, value), np.zeros(3)))
+        return self.origin.of(Placement(np.eye(3), value * self.axis))
+
+
+class Linkage:
+    """The links and joints of the URDF `text`; meshes and inertias in it are not looked at.
+
+    Of its joints fixed, revolute, continuous and prismatic ones are known, and what mimics them.
+    """
+
+    def __init__(self, text: str) -> None:
+        if "<!DOCTYPE" in text.upper():
+            raise Refusal("expected a URDF without a document type; remove the <!DOCTYPE> line")
+        try:
+            robot = ElementTree.fromstring(text)
+        except ElementTree.ParseError as error:
+            raise Refusal(f"expected a URDF, got XML with an error: {error}") from error
+        links = {link.get("name", "") for link in robot.iter("link")}
+        self._joints, names = dict[str, Joint](), dict[str, Joint]()
+        for element in robot.findall("joint"):
+            name, child, joint = _joint(element)
+            if not {child, joint.parent} <= links or child in self._joints or name in names:
+                raise Refusal(
+                    f"expected each joint once, between links of the URDF, and one joint to each "
+                    f"link; got joint {name!r} from {joint.parent!r} to {child!r}"
+                )
+            self._joints[child] = names[name] = joint
+        if len(roots := links - self._joints.keys()) != 1:
+            raise Refusal(f"expected a URDF whose links make one tree, got {len(roots)} roots")
+        self.root = roots.pop()
+        self.joints = {
+            name: joint.limits
+            for name, joint in names.items()
+            if joint.kind not in _FIXED and joint.of == name
+        }
+        """The limits of each joint that has a value of its own, in rad or m."""
+        for joint in names.values():
+            if joint.kind not in _FIXED and joint.of not in self.joints:
+                raise Refusal(f"expected a joint to mimic that moves, got {joint.of!r}")
+        self._chains = {link: self._chain(link) for link in links}
+
+    def _chain(self, link: str) -> list[Joint]:
+        """The joints from the root to `link`."""
+        chain = list[Joint]()
+        while link != self.root:
+            chain.append(self._joints[link])
+            link = chain[-1].parent
+            if len(chain) > len(self._joints):
+                raise Refusal(f"expected a URDF whose links make one tree, got a ring at {link!r}")
+        return chain[::-1]
+
+    def __contains__(self, link: str) -> bool:
+        return link in self._chains
+
+    def at(self, link: str, angles: Angles) -> Placement:
+        """The placement of `link` in the root link, for the value of each joint, in rad or m."""
+        found = IDENTITY
+        for joint in self._chains[link]:
+            value = joint.offset
+            if joint.kind not in _FIXED:
+                if not math.isfinite(own := angles.get(joint.of, math.nan)):
+                    needed = ", ".join(sorted({one.of for one in self._chains[link] if one.of}))
+                    raise Refusal(
+                        f"expected the values of the joints {needed} for the link {link!r}, got "
+                        f"none of {joint.of!r}; send all of them in rad or m"
+                    )
+                value += joint.scale * own
+            found = found.of(joint.at(value))
+        return found
+
+
+def _joint(element: ElementTree.Element) -> tuple[str, str, Joint]:
+    """The name of the joint, the link that it moves, and the joint."""
+    name, kind = element.get("name", ""), element.get("type", "")
+    if kind not in (*_FIXED, *_TURNS, *_SLIDES):
+        known = ", ".join((*_FIXED, *_TURNS, *_SLIDES))
+        raise Refusal(f"expected joint {name!r} to be one of {known}, got {kind!r}")
+    origin, axis = element.find("origin"), element.find("axis")
+    mimic, limit = element.find("mimic"), element.find("limit")
+    along = np.array(_numbers(axis, "xyz", name) if axis is not None else (1.0, 0.0, 0.0))
+    length = float(np.linalg.norm(along))
+    if kind not in _FIXED and not length > 0:
+        raise Refusal(f"expected an axis of joint {name!r} that is not zero, got {along.tolist()}")
+    bounds = (-math.inf, math.inf)
+    if limit is not None and kind != "continuous":
+        bounds = _number(limit, "lower", 0.0, name), _number(limit, "upper", 0.0, name)
+    joint = Joint(
+        _link(element, "parent"),
+        kind,
+        placement(_numbers(origin, "xyz", name), _numbers(origin, "rpy", name)),
+        along if kind in _FIXED else along / length,
+        bounds,
+        "" if kind in _FIXED else name if mimic is None else mimic.get("joint", ""),
+        1.0 if mimic is None else _number(mimic, "multiplier", 1.0, name),
+        0.0 if mimic is None else _number(mimic, "offset", 0.0, name),
+    )
+    return name, _link(element, "child"), joint
+
+
+def _link(element: ElementTree.Element, end: str) -> str:
+    found = element.find(end)
+    return "" if found is None else found.get("link", "")
+
+
+def _number(element: ElementTree.Element, key: str, default: float, joint: str) -> float:
+    return _values(element.get(key, f"{default}"), 1, key, joint)[0]
+
+
+def _numbers(element: ElementTree.Element | None, key: str, joint: str) -> Triple:
+    x, y, z = _values("0 0 0" if element is None else element.get(key, "0 0 0"), 3, key, joint)
+    return x, y, z
+
+
+def _values(text: str, count: int, key: str, joint: str) -> list[float]:
+    try:
+        found = [float(one) for one in text.split()]
+    except ValueError:
+        found = []
+    if len(found) != count or not all(map(math.isfinite, found)):
+        raise Refusal(f"expected {count} numbers at {key} of joint {joint!r}, got {text!r:.60}")
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class HandDescription:
+    """A hand with `fingers`; with a `linkage`, their links move as its joints do."""
+
+    title: str
+    fingers: tuple[Finger, ...]
+    linkage: Linkage | None = None
+
+    def __post_init__(self) -> None:
+        names = [finger.name for finger in self.fingers]
+        if not 0 < len(names) <= _MOST_FINGERS or len({*names}) != len(names):
+            raise Refusal(
+                f"expected 1 to {_MOST_FINGERS} fingers of different names, got {names!r:.200}"
+            )
+        for finger in self.fingers:
+            if not is_finger(finger.name):
+                raise Refusal(
+                    "expected a finger's name to be a letter, then letters, digits and _, 32 at "
+                    f"most, got {finger.name!r:.60}; change it"
+                )
+            if finger.link and (self.linkage is None or finger.link not in self.linkage):
+                raise Refusal(
+                    f"expected a link of the hand's URDF for finger {finger.name!r}, got "
+                    f"{finger.link!r}; name the file at `urdf`, or leave the link out"
+                )
+
+    @property
+    def joints(self) -> dict[str, tuple[float, float]]:
+        """The limits in rad or m of each joint whose value `placements` needs."""
+        return {} if self.linkage is None else self.linkage.joints
+
+    def placements(self, angles: Angles | None = None) -> dict[str, Placement]:
+        """Where each finger's skin is in the hand's frame, by name.
+
+        `angles` has the value of each joint in rad or m.
+        """
+        found = dict[str, Placement]()
+        for finger in self.fingers:
+            own = placement(finger.position, finger.rotation)
+            if self.linkage is not None and finger.link:
+                own = self.linkage.at(finger.link, angles or {}).of(own)
+            found[finger.name] = own
+        return found
+
+
+HAND = Part(
+    "Hand",
+    {
+        "format": Key("Format", "The format of the file: 1.", kind=int, offered=False),
+        "title": Key("Title", "The name of the hand.", kind=str, default=""),
+        "urdf": Key(
+            "URDF",
+            "A file with the hand's links and joints, beside this one.",
+            kind=str,
+            default="",
+        ),
+    },
+)
+_DEGREE = Unit("rad", "\N{DEGREE SIGN}", math.pi / 180)
+FINGER = Part(
+    "Finger",
+    {
+        "name": Key("Name", "The name of the finger.", example="thumb"),
+        "source": Key("Source", "Where its frames come from.", example="sim:fingertip-cap"),
+        "position": Key(
+            "Position",
+            "Place of the skin's frame in that of the link or hand.",
+            Unit("m", "mm", 1e-3),
+            limits=Within(-10, 10, "m"),
+        ),
+        "rotation": Key(
+            "Rotation",
+            "Roll, pitch and yaw of the skin's frame.",
+            _DEGREE,
+            limits=Within(-2 * math.pi, 2 * math.pi, "rad"),
+        ),
+        "link": Key("Link", "The link of the URDF that carries the skin."),
+        "position_sd": Key(
+            "Position uncertain by",
+            "Standard deviation of the position along each axis.",
+            Unit("m", "mm", 1e-3),
+            limits=Within(0, 1, "m"),
+        ),
+        "rotation_sd": Key(
+            "Rotation uncertain by",
+            "Standard deviation of the rotation about each axis.",
+            _DEGREE,
+            limits=Within(0, 1, "rad"),
+        ),
+        "conforms": Key("Conforms", "Whether the skin takes the shape of what touches it."),
+    },
+    (Finger,),
+)
+
+
+def load_hand(file: Path, trust: Trust = False) -> HandDescription:
+    """The hand that the TOML `file` describes; `trust` as of `kappaskin.scenes.named_file`."""
+    text = _text(file, "a hand")
+    top = TomlTable(parsed(text, file, "a hand"), text, str(file))
+    if (version := HAND.value(top, "format")) != FORMAT:
+        raise top.refusal(f"expected format = {FORMAT}, got {version}", "format")
+    linkage = None
+    if name := HAND.value(top, "urdf"):
+        with top.blamed("urdf"):
+            linkage = Linkage(_text(named_file(name, file.parent, trust, "hand"), "a URDF"))
+    fingers = list[Finger]()
+    for one in top.tables("finger"):
+        fingers.append(FINGER.make(one, Finger))
+        one.done()
+    title = HAND.value(top, "title") or file.stem
+    top.done()
+    with top.blamed():
+        return HandDescription(title, tuple(fingers), linkage)
+
+
+def _text(file: Path, what: str) -> str:
+    try:
+        return read_file(file, _LARGEST).decode("utf-8-sig")
+    except (OSError, ValueError) as error:
+        raise Refusal(f"{file}: cannot be read as {what} ({error}); check its name") from error
+
+
+def angles_from_json(text: str) -> dict[str, float]:
+    """The value of each joint, in rad or m, from a JSON object `{"joint": value}`."""
+    table: Any = json_table(text)
+    return {name: table.get(name, float) for name in table}
