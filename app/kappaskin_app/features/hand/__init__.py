@@ -109,8 +109,5 @@ class HandFeature:
         )
         panel.chosen.connect(guarded(session.show_finger))
         session.finger_changed.connect(guarded(panel.mark))
-        session.finger_changed.connect(
-            guarded(lambda finger: shell.setWindowTitle(f"Kappaskin: {finger}"))
-        )
         panel.mark(session.finger)
         shell.begun.connect(guarded(lambda *_: shell.docks.reveal("hand")))

@@ -393,10 +393,10 @@ class PlaybackControl(QObject):
             self._actions["replay-recompute"].setText(_RECORDED if self._recomputes else _RECOMPUTE)
 
     def _show_title(self, replay: Replay | None) -> None:
-        title = "Kappaskin"
+        title = " \N{EN DASH} ".join(filter(None, (self._session.finger, "Kappaskin")))
         if replay is not None and self.summary is not None:
             name = printable(self.summary.path.name)
-            title = f"{name}, recorded {day(replay.begun)} \N{EN DASH} Kappaskin"
+            title = f"{name}, recorded {day(replay.begun)} \N{EN DASH} {title}"
         if title != self._window.windowTitle():
             self._window.setWindowTitle(title)
 

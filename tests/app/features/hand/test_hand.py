@@ -52,7 +52,7 @@ def test_a_finger_that_is_chosen_is_shown_with_its_own_settings(hand, until):
     assert (session.finger, session.source) == ("index", "sim:fingertip-cap")
     assert history.settings.functions_x != 5
     assert not history.stack.canUndo()
-    assert "index" in hand.windowTitle()
+    until(lambda: hand.windowTitle().startswith("index"))
 
     choose(hand, "thumb")
     until(lambda: session.estimate is not None and session.status.sensor.layout.patch == patch)
