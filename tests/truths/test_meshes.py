@@ -222,41 +222,53 @@ PAD_AXES = np.array([9e-3, 7e-3, 6e-3]) / [
 ]
 
 
-class _PadTruth:
-    """Of the elements in the middle of the triangles nearest to those of the scene."""
+class _HeldInPart:
+    """An ellipsoid whose rim is held `half` a turn in rad to both sides of the axis x.
 
-    def __init__(self, rings):
-        mesh = PAD.plate.patch
+    Of elements in the middle of the truth's triangles, those nearest to the ones of a `layout`.
+    """
+
+    def __init__(self, plate, layout, axes, angle, half, force, rings=18):
+        self.plate, self.axes, self.angle, self.force = plate, axes, angle, force
+        mesh = plate.patch
         self.top = mesh.places[mesh.points[:, 2].argmax()]
-        self.solid = _solid(rings, PAD_AXES, PAD_ANGLE, PAD.plate.rigidity, pi / 3)
+        self.solid = _solid(rings, axes, angle, plate.rigidity, half)
         at = self.solid.places(np.arange(len(self.solid.triangles)))[:, :2] + self.top
-        near = np.linalg.norm(at[:, None] - PAD.layout.positions, axis=2)
+        near = np.linalg.norm(at[:, None] - layout.positions, axis=2)
         elements = np.unique(near.argmin(axis=0))
         self.layout = SensorLayout.scattered(mesh, at[elements])
         self.read = self.solid.reader(elements)
 
     def forces(self, load):
-        x, y = (np.array([load.x, load.y]) - self.top) / PAD_AXES[:2]
-        middle = np.array([x, y, sqrt(1 - x**2 - y**2)]) * PAD_AXES
+        x, y = (np.array([load.x, load.y]) - self.top) / self.axes[:2]
+        middle = np.array([x, y, sqrt(1 - x**2 - y**2)]) * self.axes
         forces = self.solid.spread(
             lambda at: np.exp(-np.sum((at - middle) ** 2, -1) / (2 * load.sd**2))
         )
         return load.force * forces / forces.sum()
 
     def load(self, share, sd=0.8e-3):
-        t, turn = 0.85 * PAD_ANGLE * sqrt(share[0]), 2 * pi * share[1]
+        t, turn = 0.85 * self.angle * sqrt(share[0]), 2 * pi * share[1]
         way = np.array([np.cos(turn), np.sin(turn)])
-        return Load(*(self.top + np.sin(t) * way * PAD_AXES[:2]), 0.06, sd=sd)
+        return Load(*(self.top + np.sin(t) * way * self.axes[:2]), self.force, sd=sd)
 
 
 @cache
-def _pad_truth(rings):
-    return _PadTruth(rings)
+def _held_in_part(name):
+    if name == "thumb-pad":
+        return _HeldInPart(PAD.plate, PAD.layout, PAD_AXES, PAD_ANGLE, pi / 3, 0.06)
+    # Nothing was chosen by these.
+    half, angle, axes = {"third": pi / 3, "half": pi / 2}[name], radians(60), np.full(3, R)
+    nodes, triangles = ellipsoid(24, axes, angle)
+    rim = MeshSkin(nodes, triangles, H).rim
+    turn = np.arctan2(nodes[rim, 1], nodes[rim, 0])
+    mesh = MeshSkin(nodes, triangles, H, held=rim[np.abs(turn) < half + 1e-6])
+    return _HeldInPart(Plate(mesh), SensorLayout.spread(mesh, 60), axes, angle, half, 0.15)
 
 
 @pytest.mark.full
 def test_a_pad_held_along_a_third_of_its_rim_moves_and_bends_as_a_solid_shell():
-    truth, mesh = _pad_truth(18), PAD.plate.patch
+    truth, mesh = _held_in_part("thumb-pad"), PAD.plate.patch
     layout, out = truth.layout, np.zeros((4, truth.layout.channels))
     influence = influence_of(PAD.plate, layout, "clamped", 15, out)
     basis = basis_for(mesh, "clamped", 15, 15)
@@ -280,18 +292,19 @@ def test_a_pad_held_along_a_third_of_its_rim_moves_and_bends_as_a_solid_shell():
 
 
 @dataclass(frozen=True, eq=False)
-class PadCase(Case):
+class HeldCase(Case):
     @property
     def layout(self):
-        return _pad_truth(18).layout
+        return _held_in_part(self.name).layout
 
 
 @pytest.mark.full
-def test_intervals_on_a_pad_held_along_a_third_of_its_rim_cover_the_truth():
-    truth = _pad_truth(18)
-    case = PadCase(
-        "thumb-pad",
-        PAD.plate,
+@pytest.mark.parametrize("name", ["thumb-pad", "third", "half"])
+def test_intervals_on_a_mesh_held_in_part_cover_the_truth(name):
+    truth = _held_in_part(name)
+    case = HeldCase(
+        name,
+        truth.plate,
         lambda layout: lambda load: truth.read(truth.forces(load)),
         truth.load,
         edge="clamped",
