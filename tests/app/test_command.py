@@ -167,7 +167,9 @@ def test_a_window_loads_what_charts_need_in_another_thread_and_collects_garbage_
 
 def test_the_app_opens_on_a_fingertip_without_a_source(monkeypatch) -> None:
     started: list[str] = []
-    monkeypatch.setattr("kappaskin_app.launch.launch", lambda source, *_: started.append(source))
+    monkeypatch.setattr(
+        "kappaskin_app.launch.launch", lambda sources, *_: started.extend(sources.values())
+    )
     assert main(["app"]) == 0
     settings = settings_for(*started)
     scene = scene_of(settings)

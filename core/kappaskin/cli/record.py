@@ -471,7 +471,8 @@ def export(
             with ExportTask(request) as exporting:
                 done = result_of(exporting.wait(), Exported)
         except KeyboardInterrupt:
-            raise Refusal(f"stopped before the end; {request.to} was not written") from None
+            which = f"{request.to} was not" if several else "nothing was"
+            raise Refusal(f"stopped before the end; {which} written") from None
         except Refusal as refusal:
             if not several:
                 raise

@@ -245,10 +245,10 @@ def _read_stl(content: bytes) -> _Mesh:
     else:
         announced = f" where {count} triangles are announced" if len(content) >= 84 else ""
         is_text = len(content) > 0 and content.isascii()
-        found = f"another text, {content[:20].decode()!r}" if is_text else ""
+        found = "another text" if is_text else f"{len(content)} bytes{announced}"
         raise Refusal(
             "expected an STL text that begins with `solid`, or 84 bytes and 50 for each triangle, "
-            f"got {found or f'{len(content)} bytes{announced}'}"
+            f"got {found}"
         )
     soup = MeshSurface(corners, np.arange(len(corners)).reshape(-1, 3))
     merged = _joined(soup, _equal(corners))

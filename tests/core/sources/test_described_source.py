@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from kappaskin import Pipeline, Refusal, Setup, load_scene
-from kappaskin.cli import of_sensor
+from kappaskin.cli.common import of_sensor
 from kappaskin.errors import SourceError
 from kappaskin.frames import Frame
 from kappaskin.live import Engine

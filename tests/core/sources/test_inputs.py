@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from kappaskin import Pipeline, Refusal, Setup
-from kappaskin.cli import of_sensor
+from kappaskin.cli.common import of_sensor
 from kappaskin.errors import EndedSource, SourceError
 from kappaskin.recording import Recorder, ReplayedSource, Verification
 from kappaskin.sources import WireMonitor, described_source, load_description, open_source
