@@ -513,8 +513,7 @@ class Session(QObject):
         now, connections = time.monotonic(), self.status.connections
         if reports := now >= self._next_status:
             self._next_status = now + _STATUS
-            for engine in self.fingers.engines.values() if self.fingers else (self.engine,):
-                engine.revive()
+            (self.fingers or self.engine).revive()
             self.status = self._of_hand(self.engine.status())
             self._lost_since = min(self._lost_since, now) if self._lost else math.inf
             if self.status.connections != connections:

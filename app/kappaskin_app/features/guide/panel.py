@@ -220,13 +220,19 @@ class _Text(QTextBrowser):
         self._seek()
 
     def _seek(self) -> None:
-        """Scroll to what is sought; until it is laid out, the view stays as it was."""
+        """Scroll to what is sought; until it is laid out, the view stays as it was.
+
+        What is above may still be laid out anew, so it is followed until the whole page is.
+        """
+        shown = self._sought is None
         if self._sought is not None:
             top, bar = round(self._sought()), self.verticalScrollBar()
-            if 0 < top <= bar.maximum() or self.document().lastBlock().layout().lineCount():
-                self._sought = None
+            whole = self.document().lastBlock().layout().lineCount() > 0
+            if shown := 0 < top <= bar.maximum() or whole:
                 bar.setValue(top)
-        self.viewport().setUpdatesEnabled(self._sought is None)
+            if whole:
+                self._sought = None
+        self.viewport().setUpdatesEnabled(shown)
 
     def _read_again(self) -> None:
         """Format the page in the look of now."""
