@@ -40,7 +40,8 @@ class FingerView(QWidget):
         column.addWidget(self.map, 1)
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
-        self.button.click()
+        if event.button() == Qt.MouseButton.LeftButton:
+            self.button.click()
 
     def show_finger(self, status: Status, estimate: Estimate | None) -> None:
         """Show the newest estimate, and the state of the source."""
@@ -53,8 +54,8 @@ class FingerView(QWidget):
         patch, contact = sensor.layout.patch, estimate.contact
         values, sides = _MM * estimate.surface, (patch.a, patch.b)
         limit = self._scale.follow(largest(values), now)
-        pressed = np.nanmax(values) >= -np.nanmin(values)
-        limits, part = ((0.0, limit), "sequential") if pressed else ((-limit, 0.0), "pulled")
+        pulled = largest(np.minimum(values, 0.0)) > largest(np.maximum(values, 0.0))
+        limits, part = ((-limit, 0.0), "pulled") if pulled else ((0.0, limit), "sequential")
         self.map.show_surface(values, limits, part, contact.position, sides)
         self.map.map.show_faded(origin(state) not in (LIVE, SIM))
         off = Coverage.now.of(contact.force_sd, contact.force_95)
@@ -76,7 +77,9 @@ class HandPanel(QWidget):
         for finger in session.fingers.engines if session.fingers else ():
             self.views[finger] = view = FingerView(finger)
             buttons.addButton(view.button)
-            view.button.clicked.connect(guarded(lambda *_, finger=finger: self.chosen.emit(finger)))
+            view.button.toggled.connect(
+                guarded(lambda on, finger=finger: on and self.chosen.emit(finger))
+            )
             row.addWidget(view, 1)
         self._timer = QTimer(self, interval=_EVERY)  # pyright: ignore[reportCallIssue]
         self._timer.timeout.connect(guarded(self.show_fingers))

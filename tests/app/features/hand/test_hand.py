@@ -37,8 +37,8 @@ def choose(window, finger):
     assert view.button.isChecked()
 
 
-def test_each_finger_has_a_map_with_its_state_and_force(hand):
-    assert all(text.startswith("SIM: ") for text in words(hand))
+def test_each_finger_has_a_map_with_its_state_and_force(hand, until):
+    until(lambda: all(text.startswith("SIM: ") and " N" in text for text in words(hand)))
     assert hand.docks["hand"].isVisible()
 
 
@@ -60,6 +60,14 @@ def test_a_finger_that_is_chosen_is_shown_with_its_own_settings(hand, until):
     assert session.engine.requested.setup.Ni == 5
 
 
+def test_the_arrow_keys_go_from_finger_to_finger(hand):
+    thumb, index = (view.button for view in hand_of(hand).values())
+    thumb.setFocus()
+    QTest.keyClick(thumb, Qt.Key.Key_Right)
+    assert index.isChecked()
+    assert hand.session.finger == "index"
+
+
 def test_a_finger_that_dies_leaves_the_others_alone_and_comes_back(hand, until):
     engines, before = hand.session.fingers.engines, hand.session.status.generation
     dead = engines["index"].pid
@@ -67,7 +75,7 @@ def test_a_finger_that_dies_leaves_the_others_alone_and_comes_back(hand, until):
     until(lambda: engines["index"].pid != dead and words(hand)[1].startswith("SIM: "))
 
     assert hand.session.status.generation == before
-    assert words(hand)[0].startswith("SIM: ")
+    until(lambda: words(hand)[0].startswith("SIM: "))
 
 
 def test_one_recording_holds_all_fingers(hand, until, tmp_path):
