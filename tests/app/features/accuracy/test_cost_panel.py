@@ -36,7 +36,10 @@ def place_of(plot: CostPlot, cost: Cost) -> QPointF:
 def _room(plot: CostPlot, cost: Cost) -> float:
     """Pixels to the next point; none around the present one, a click on which changes nothing."""
     here = place_of(plot, cost)
-    others = (place_of(plot, other) - here for other in plot.frontier.costs if other != cost)
+    others = [place_of(plot, other) - here for other in plot.frontier.costs if other != cost]
+    # What is measured live has a cross of its own, which a click next to it means.
+    (live,) = (each for each in plot.series if each.name == "in use, measured")
+    others += [plot.place_of(*at) - here for at in zip(live.x, live.y, strict=True)]
     present = cost.setting == Setting("least-squares", (8, 8), (10, 10))
     return 0.0 if present else min(math.hypot(way.x(), way.y()) for way in others)
 
