@@ -144,10 +144,8 @@ def _shapes(mesh: MeshSkin, edge: str, count: int) -> tuple[Array, Array]:
     middles = mesh.points[mesh.spread(loads)]
     squares = scipy.spatial.distance.cdist(mesh.points, middles, "sqeuclidean")
     forces = np.exp(-squares / (2 * _WIDTH**2 * area / loads)) * mesh.areas[:, None]
-    felt, solve = (
-        pressed(mesh, forces / forces.sum(axis=0)),
-        factored(mesh, edge, _rigidity(mesh), _POISSON),
-    )
+    felt = pressed(mesh, forces / forces.sum(axis=0))
+    solve = factored(mesh, edge, _rigidity(mesh), _POISSON)
     moved = np.empty_like(felt)
     for k in range(0, loads, _REPORTED):
         progress.get()(_SOLVED * k / loads)

@@ -207,18 +207,18 @@ class PointContact:
         return noise**2 * np.multiply.outer(unit, unit) * covariance[:3, :3]
 
     def information(self, x: float, y: float, s: float, force: float, noise: float) -> Array:
-        """What the readings of each element tell (P, n, n) of such a load: what adds to W.
+        """The Fisher information (P, n, n) of the readings of each element on such a load.
 
-        The inverse W of the covariance of all that is unknown: the force as a share, x and y in m,
-        the size, what is free, and as the last the profile, which is 0 with a variance of 1.
+        On all that is unknown: the force as a share, x and y in m, the size, what is free, and as
+        the last the profile, which is 0 with a variance of 1.
         """
         weights, strength = self._look(x, y, s, force, noise)
         n, unit = self._unknowns, strength / noise
         profile = _TO_GAUSSIAN * unit * self._rows[5:6]
         rows = np.concatenate([unit * self._rows[:n], self._free, profile])
-        told = np.zeros((self._element.max() + 1, *2 * (len(rows),)))
-        np.add.at(told, self._element, np.einsum("ir,jr,r->rij", rows, rows, weights))
-        return told
+        found = np.zeros((self._element.max() + 1, *2 * (len(rows),)))
+        np.add.at(found, self._element, np.einsum("ir,jr,r->rij", rows, rows, weights))
+        return found
 
     def _look(
         self, x: float, y: float, s: float, force: float, noise: float

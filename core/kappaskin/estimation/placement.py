@@ -5,7 +5,8 @@ placement makes the volume of that as small as can be, det M'M as large; an A-op
 variance of the displacement over the skin, trace (M'M)^-1 G with G the functions' mean products.
 Readings that differ in unit are divided by their noise first. Where their zero is unknown, M has a
 column for each offset, and G zeros: what is determined of the shape is what is left beside them.
-What elements tell of a load adds up: a placement may also make the mean error of loads small.
+The information of elements on a load adds up: a placement may also make the mean error of loads
+small.
 """
 
 import math
@@ -124,15 +125,17 @@ def place_elements(
     return PLACEMENTS[by](layout, basis, spacing, sigma)
 
 
-Told = Callable[[Array], tuple[Array, Array, Array]]
-"""What elements at places (C, 2) tell of n unknowns of each of G loads, (C, G, n, n).
+LoadInformation = Callable[[Array], tuple[Array, Array, Array]]
+"""The Fisher information (C, G, n, n) of elements at places (C, 2) on n unknowns of G loads.
 
-That is what adds to the inverse of their covariance V; beside it what is known beforehand (n, n),
-and weights E (m, G, n, n) of m kinds of errors: the mean square of one is the sum of trace E V.
+With it the information of the prior (n, n), and weights E (m, G, n, n) of m kinds of errors: the
+mean square of an error is the sum of trace E V over the loads, with their covariance V.
 """
 
 
-def place_for_loads(layout: SensorLayout, spacing: float, told: Told) -> SensorLayout:
+def place_for_loads(
+    layout: SensorLayout, spacing: float, information_at: LoadInformation
+) -> SensorLayout:
     """As many elements as `layout` has, at least `spacing` in m apart, that determine loads best.
 
     They make the sum of the mean squares of all kinds of errors small, each over what it is with
@@ -140,20 +143,20 @@ def place_for_loads(layout: SensorLayout, spacing: float, told: Told) -> SensorL
     that is `layout` itself. Raises a `Refusal` where there is no room.
     """
     places = _candidates(layout, spacing)
-    information, known, errors = told(np.concatenate([places, layout.positions]))
+    information, prior, errors = information_at(np.concatenate([places, layout.positions]))
     information, own = np.split(information, [len(places)])
-    told_now: Array = known + own.sum(axis=0)
-    ridge = _RIDGE * np.diag(np.diagonal(told_now, axis1=1, axis2=2).mean(axis=0))
-    V = _inverses(told_now + ridge)
+    total: Array = prior + own.sum(axis=0)
+    ridge = _RIDGE * np.diag(np.diagonal(total, axis1=1, axis2=2).mean(axis=0))
+    V = _inverses(total + ridge)
     E: Array = np.einsum("mgij,m->gij", errors, 1 / np.einsum("mgij,gij->m", errors, V))
     chosen, free = _nearest(layout.positions, places), np.ones(len(places), bool)
     free[chosen] = False
-    told_now = known + ridge + information[chosen].sum(axis=0)
-    least = float(np.vdot(E, _inverses(told_now)))
+    total = prior + ridge + information[chosen].sum(axis=0)
+    least = float(np.vdot(E, _inverses(total)))
     for _ in range(_SWEEPS):
         before = least
         for n, here in enumerate(chosen.tolist()):
-            others = told_now - information[here]
+            others = total - information[here]
             left_over = _inverses(others)
             # What a little of an element would gain shows where to try all of it.
             slope = left_over @ E @ left_over
@@ -163,7 +166,7 @@ def place_for_loads(layout: SensorLayout, spacing: float, told: Told) -> SensorL
                 after = others + information[there]
                 left = float(np.vdot(E, _inverses(after)))
                 if left < least * (1 - _GAIN):
-                    least, told_now, chosen[n] = left, after, there
+                    least, total, chosen[n] = left, after, there
             free[here], free[chosen[n]] = True, False
         if least == before:
             break

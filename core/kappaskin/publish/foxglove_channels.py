@@ -39,7 +39,7 @@ class Channel:
     language: str = "jsonschema"
 
     def advertised(self, finger: str) -> dict[str, object]:
-        """What a client is told of it; the topic of a `finger` begins with its name."""
+        """The channel as it is advertised; the topic of a `finger` begins with its name."""
         return {
             "id": self.number,
             "topic": f"/{finger}{self.topic}" if finger else self.topic,

@@ -376,13 +376,13 @@ def placed_estimator(
     basis = basis_for(patch, scene.edge, Ni, 1 if patch.strip else Nj)
     sigma = scene.layout.sigma(scene.transduction.noise)
     if by == "contact":
-        layout = place_for_loads(scene.layout, distance, partial(_told_of_loads, scene))
+        layout = place_for_loads(scene.layout, distance, partial(_load_information, scene))
     else:
         layout = place_elements(scene.layout, basis, by, distance, sigma)
     return estimator_for(method, basis, layout, sigma)
 
 
-def _told_of_loads(scene: Scene, places: Array) -> tuple[Array, Array, Array]:
+def _load_information(scene: Scene, places: Array) -> tuple[Array, Array, Array]:
     """What elements at `places` (C, 2) tell of the scene's load all over the skin.
 
     As `place_for_loads` takes it: of the force as a share and the place along the skin.
