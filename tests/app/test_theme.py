@@ -329,6 +329,14 @@ def test_a_window_that_is_switched_is_as_one_that_began_so(
     def pictures() -> dict[str, QImage]:
         return {name: part.grab().toImage() for name, part in parts_of(window).items()}
 
+    def settled() -> dict[str, QImage]:
+        """Pictures once no more scroll bars come or go, as grabbing a hidden part lays it out."""
+        before, now = {}, pictures()
+        while now != before:
+            qtbot.wait(20)
+            before, now = now, pictures()
+        return now
+
     monkeypatch.setattr(badge, "_STALE_AFTER", math.inf)  # however long a picture takes
     found = list[dict[str, QImage]]()
     for begun in THEMES:
@@ -341,8 +349,7 @@ def test_a_window_that_is_switched_is_as_one_that_began_so(
         window.history.change("Theme", -1, theme=theme)
         say_much(window)  # as one or the other panel says something else with other settings
         qtbot.waitUntil(lambda window=window: all_followed(window))
-        qtbot.wait(100)
-        found.append(pictures())
+        found.append(settled())
         window.close()
     one, other = found
     assert [name for name in one if not alike(one[name], other[name])] == []
