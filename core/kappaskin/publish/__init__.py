@@ -7,6 +7,7 @@ from kappaskin.publish.haptic_cue import Cue as Cue
 from kappaskin.publish.haptic_cue import CueGenerator as CueGenerator
 from kappaskin.publish.haptic_cue import CueLimits as CueLimits
 from kappaskin.publish.message import SourceState as SourceState
+from kappaskin.publish.publishing import CueStatus as CueStatus
 from kappaskin.publish.publishing import Latency as Latency
 from kappaskin.publish.publishing import Publishing as Publishing
 from kappaskin.publish.publishing import PublishStatus as PublishStatus

@@ -79,12 +79,15 @@ class Cue:
     `slip` in m/s along x and y are multiplied by `scale` already, from 1 for new data to 0 for old
     or none; so are their standard deviations, NaN if unknown. The force acts along the unit vector
     `direction`, the inward normal in the skin's coordinates, at `place` x, y in m, NaN without a
-    contact. `age` in s is that of the estimate of the scan `sequence`, NaN and -1 without one.
+    contact. `age` in s is that of the estimate of the scan `sequence`, NaN and -1 without one, whose
+    bytes were `read` at a monotonic time in s; the first cue of it is `fresh`.
     """
 
     state: str
     scale: float
     age: float
+    read: float
+    fresh: bool
     sequence: int
     force: float
     direction: tuple[float, float, float]
@@ -100,9 +103,10 @@ _NONE, _ZERO = (math.nan, math.nan), (0.0, 0.0)
 
 @dataclass(frozen=True)
 class _Felt:
-    """What an estimate says of the contact, of data of the time `began`, and when it `came`."""
+    """What an estimate says of the contact, of data that `began`, were `read`, and `came` here."""
 
     began: float
+    read: float
     came: float
     sequence: int
     force: float = 0.0
@@ -147,6 +151,7 @@ class CueGenerator:
         self._clock, self._suspended = clock, suspended
         self.streams = True
         self._newest: _Felt | None = None
+        self._before: _Felt | None = None  # of the last cue
         self._slips = SlipEstimator()
         self._last, self._slept = clock(), suspended()
         self._scale = self._force = 0.0
@@ -157,14 +162,14 @@ class CueGenerator:
         contact, geometry, came = estimate.contact, estimate.geometry, self._clock()
         slip, slip_sd = self._slips(estimate)
         read = estimate.host_time
-        began = estimate.taken if estimate.taken <= read else read
+        times = estimate.taken if estimate.taken <= read else read, read, came
         if not contact.present:
-            self._newest = _Felt(began, came, estimate.sequence)
+            self._newest = _Felt(*times, estimate.sequence)
             return
         limits, k, inward = self.limits, geometry.principal, -geometry.normal
         known = not contact.near_rim and contact.force > 0
         self._newest = _Felt(
-            *(began, came, estimate.sequence, min(contact.force, limits.force) if known else 0.0),
+            *(*times, estimate.sequence, min(contact.force, limits.force) if known else 0.0),
             _three(inward) if np.isfinite(inward).all() else None,
             _two(contact.position),
             *_known(np.clip(k, -limits.curvature, limits.curvature), geometry.principal_sd),
@@ -180,7 +185,8 @@ class CueGenerator:
         if newest is not None and self.streams:
             wanted = min(max((FULL + FADE - age) / FADE, 0.0), 1.0) if age >= 0 else 0.0
         self._scale = _towards(self._scale, wanted, passed / FADE, passed / RISE)
-        felt = newest or _Felt(now, now, -1)
+        felt = newest or _Felt(now, now, now, -1)
+        fresh, self._before = felt is newest is not self._before, newest
         most = passed * self.limits.rate
         self._force = _towards(self._force, self._scale * felt.force, most, most)
         self._direction = felt.direction or self._direction
@@ -189,8 +195,8 @@ class CueGenerator:
             for x, y in (felt.curvature, felt.curvature_sd, felt.slip, felt.slip_sd)
         )
         return Cue(
-            *(self._state(newest, age), self._scale, age, felt.sequence, self._force),
-            *(self._direction, felt.place, *scaled),
+            *(self._state(newest, age), self._scale, age, felt.read, fresh, felt.sequence),
+            *(self._force, self._direction, felt.place, *scaled),
         )
 
     def _passed(self) -> float:
