@@ -9,7 +9,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from kappaskin.errors import Refusal
-from kappaskin.frames import Array, Estimate
+from kappaskin.frames import Estimate
+from kappaskin.pipeline import Reported
 
 FULL, FADE, RISE = 0.04, 0.05, 0.1
 """Seconds: the age up to which an estimate is felt fully, its fading, and the return from none.
@@ -79,8 +80,8 @@ class Cue:
     `slip` in m/s along x and y are multiplied by `scale` already, from 1 for new data to 0 for old
     or none; so are their standard deviations, NaN if unknown. The force acts along the unit vector
     `direction`, the inward normal in the skin's coordinates, at `place` x, y in m, NaN without a
-    contact. `age` in s is that of the estimate of the scan `sequence`, NaN and -1 without one, whose
-    bytes were `read` at a monotonic time in s; the first cue of it is `fresh`.
+    contact. `age` in s is that of the estimate of the scan `sequence`, NaN and -1 without one; its
+    bytes were `read` at a monotonic time in s, and the first cue of it is `fresh`.
     """
 
     state: str
@@ -159,21 +160,24 @@ class CueGenerator:
 
     def take(self, estimate: Estimate) -> None:
         """Make cues of this `estimate` from now on."""
-        contact, geometry, came = estimate.contact, estimate.geometry, self._clock()
+        contact, came = estimate.contact, self._clock()
         slip, slip_sd = self._slips(estimate)
         read = estimate.host_time
         times = estimate.taken if estimate.taken <= read else read, read, came
         if not contact.present:
             self._newest = _Felt(*times, estimate.sequence)
             return
-        limits, k, inward = self.limits, geometry.principal, -geometry.normal
-        known = not contact.near_rim and contact.force > 0
+        limits, (nx, ny, nz) = self.limits, estimate.geometry.normal.tolist()
+        x, y = contact.position.tolist()
+        k1, k1_sd, k2, k2_sd = Reported(estimate).principal()[0]
+        most, known = limits.curvature, not contact.near_rim and contact.force > 0
+        less = min(1.0, limits.slip / max(math.hypot(*slip), _LEAST))
         self._newest = _Felt(
             *(*times, estimate.sequence, min(contact.force, limits.force) if known else 0.0),
-            _three(inward) if np.isfinite(inward).all() else None,
-            _two(contact.position),
-            *_known(np.clip(k, -limits.curvature, limits.curvature), geometry.principal_sd),
-            *_known(slip * min(1.0, limits.slip / math.hypot(*slip, _LEAST)), slip_sd),
+            (-nx, -ny, -nz) if math.isfinite(nx + ny + nz) else None,
+            (x, y),
+            *_known((_towards(0.0, k1, most, most), _towards(0.0, k2, most, most)), (k1_sd, k2_sd)),
+            *_known((less * slip[0], less * slip[1]), slip_sd),
         )
 
     def __call__(self) -> Cue:
@@ -223,24 +227,14 @@ def _towards(value: float, wanted: float, down: float, up: float) -> float:
     return min(max(wanted, value - down), value + up)
 
 
-def _two(values: Array) -> Pair:
-    x, y = values.tolist()
-    return x, y
-
-
-def _three(values: Array) -> tuple[float, float, float]:
-    x, y, z = values.tolist()
-    return x, y, z
-
-
 _LEAST = 1e-12  # m/s, so that no slip is divided by
 
 
-def _known(values: Array, sd: Array) -> tuple[Pair, Pair]:
+def _known(values: Pair, sd: Pair) -> tuple[Pair, Pair]:
     """The values with their error bars; zero if they are unknown."""
-    if not np.isfinite(values).all():
+    if not math.isfinite(sum(values)):
         return _ZERO, _NONE
-    return _two(values), _two(np.where(np.isfinite(sd), sd, math.nan))
+    return values, sd if math.isfinite(sum(sd)) else _NONE
 
 
 _WINDOW = 0.05  # s of places that the slip is of
@@ -258,28 +252,32 @@ class SlipEstimator:
     """
 
     def __init__(self) -> None:
-        self._places: deque[tuple[float, Array, Array]] = deque(maxlen=_MOST)
+        self._places: deque[list[float]] = deque(maxlen=_MOST)  # time, x, y, and their sd
         self._generation = -1
 
-    def __call__(self, estimate: Estimate) -> tuple[Array, Array]:
-        """Velocity (2,) in m/s along x and y and its standard deviations, NaN if unknown."""
+    def __call__(self, estimate: Estimate) -> tuple[Pair, Pair]:
+        """Velocity in m/s along x and y and its standard deviations, NaN if unknown."""
         contact, places, now = estimate.contact, self._places, estimate.device_time
         goes_on = places and 0 < now - places[-1][0] <= _WINDOW
         if not (goes_on and contact.present and estimate.generation == self._generation):
             places.clear()
         self._generation = estimate.generation
         if contact.present:
-            places.append((now, contact.position, contact.position_sd))
+            places.append([now, *contact.position.tolist(), *contact.position_sd.tolist()])
         while places and now - places[0][0] > _WINDOW:
             places.popleft()
-        return self._slope() if len(places) > 2 else (np.full(2, math.nan), np.full(2, math.nan))
+        return self._slope() if len(places) > 2 else (_NONE, _NONE)
 
-    def _slope(self) -> tuple[Array, Array]:
-        times, places, sds = (np.array(each) for each in zip(*self._places, strict=True))
-        w = 1 / np.maximum(sds, _LEAST_SD) ** 2
-        t = times[:, None] - np.sum(w * times[:, None], axis=0) / np.sum(w, axis=0)
-        p = places - np.sum(w * places, axis=0) / np.sum(w, axis=0)
-        information = np.sum(w * t**2, axis=0)
-        v = np.sum(w * t * p, axis=0) / information
-        birge = np.sum(w * (p - v * t) ** 2, axis=0) / (len(times) - 2)
-        return v, np.sqrt(np.maximum(birge, 1.0) / information)
+    def _slope(self) -> tuple[Pair, Pair]:
+        rows = np.array(self._places)
+        times, places, w = rows[:, :1], rows[:, 1:3], np.maximum(rows[:, 3:], _LEAST_SD) ** -2
+        share = w / w.sum(axis=0)
+        t = times - (share * times).sum(axis=0)
+        p = places - (share * places).sum(axis=0)
+        wt = w * t
+        information = (wt * t).sum(axis=0)
+        v = (wt * p).sum(axis=0) / information
+        birge = (w * (p - v * t) ** 2).sum(axis=0) / (len(rows) - 2)
+        sd = np.sqrt(np.maximum(birge, 1.0) / information)
+        (x, y), (x_sd, y_sd) = v.tolist(), sd.tolist()
+        return (x, y), (x_sd, y_sd)

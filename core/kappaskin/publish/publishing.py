@@ -73,7 +73,8 @@ PORTS = {"udp": 9870, "foxglove": 8765, "cue": 9871}  # PlotJuggler's and Foxglo
 _HOSTS = {"udp": "", "foxglove": "127.0.0.1", "cue": ""}
 _SERVERS = ("foxglove",)
 _FORM = re.compile(
-    r"(\w+)://(?:\[([0-9a-fA-F:.]+(?:%[\w.-]+)?)\]|([\w.-]*))(?::([^:/?]*))?/?(?:\?(.*))?"  # IPv6, or a name
+    r"(\w+)://(?:\[([0-9a-fA-F:.]+(?:%[\w.-]+)?)\]|([\w.-]*))"  # IPv6, or a name
+    r"(?::([^:/?]*))?/?(?:\?(.*))?"
 )
 _LONGEST = 253  # characters of a name on the internet
 
@@ -90,7 +91,7 @@ class Target:
     port: int
     access: Access = THIS_MACHINE
     finger: str = ""
-    limits: CueLimits = CueLimits()
+    limits: CueLimits = field(default_factory=CueLimits)
 
     @property
     def place(self) -> tuple[str, str, int]:

@@ -19,6 +19,7 @@ from kappaskin.publish import cue as transport
 from kappaskin.publish.cue import CUE, CueSender
 from kappaskin.publish.message import LARGEST, EstimateMessage
 from kappaskin.publish.publishing import target_of
+from kappaskin.publish.udp import Udp
 
 GUIDE = (files("kappaskin_resources") / "guide" / "telemanipulation.md").read_text("utf-8")
 PRESSED = load_scene("off-centre")
@@ -75,16 +76,15 @@ def feel(sender: CueSender, message: EstimateMessage, seconds: float) -> None:
         time.sleep(5e-3)
 
 
-def test_a_cue_is_what_its_table_says(receiver, message: EstimateMessage) -> None:
+def test_a_cue_is_what_its_table_says(sender, message: EstimateMessage) -> None:
     made = CueGenerator()
-    sender = object.__new__(CueSender)
-    sender._head, sender._source, sender._number = '{"kind":"cue","source":"', "live", 3
     for felt in (False, True):
         if felt:
             made.take(message.estimate)
             time.sleep(0.02)
         told = json.loads(sender.encoded(made()), parse_constant=refuse)
-        assert list(told) == ["kind", "source", "state", *(number.key for number in CUE)]
+        head = ["kind", "version", "finger", "source", "state"]
+        assert list(told) == [*head, *(number.key for number in CUE)]
         unknown = {key for key, value in told.items() if value is None}
         sds = {key for key in told if "_sd_" in key}
         assert unknown == (set() if felt else {"sequence", "age_s", "x_m", "y_m"} | sds) | {
@@ -165,10 +165,10 @@ def test_a_force_above_the_limit_is_never_sent(receiver, message) -> None:
     assert max(cue["force_N"] for _, cue in told) == pytest.approx(0.05)
 
 
-def test_a_busy_thread_leaves_cues_out_and_counts_them(receiver, sender, message) -> None:
+def test_a_busy_thread_leaves_cues_out_and_counts_them(receiver, sender, monkeypatch) -> None:
     cues(receiver, 0.05)
-    was, slow = sender.cue.missed, sender._udp.put
-    sender._udp.put = lambda data: (time.sleep(0.03), slow(data))
+    was, put = sender.cue.missed, Udp.put
+    monkeypatch.setattr(Udp, "put", lambda *sent: (time.sleep(0.03), put(*sent)))
     told = cues(receiver, 0.3)
     assert len(told) < 20
     assert sender.cue.missed - was > 100
