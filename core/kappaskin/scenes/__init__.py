@@ -26,7 +26,9 @@ from kappaskin.scenes.scene import Scene as Scene
 from kappaskin.scenes.scene import scaled_to as scaled_to
 from kappaskin.scenes.schema import PARTS as PARTS
 from kappaskin.scenes.simulator import Simulator as Simulator
+from kappaskin.scenes.stimulus import EASES as EASES
 from kappaskin.scenes.stimulus import Indenter as Indenter
 from kappaskin.scenes.stimulus import Orbit as Orbit
+from kappaskin.scenes.stimulus import RecordedMotion as RecordedMotion
 from kappaskin.scenes.stimulus import Stimulus as Stimulus
 from kappaskin.scenes.write import write_scene as write_scene
