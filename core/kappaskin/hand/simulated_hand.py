@@ -30,7 +30,7 @@ from kappaskin.mechanics import (
     RigidObject,
     Sphere,
 )
-from kappaskin.scenes import EASES, RecordedMotion, Scene, Stimulus
+from kappaskin.scenes import EASES, RecordedMotion, Scene, Stimulus, usual_reference
 from kappaskin.skin import Cap
 
 SHAPES = ("ball", "cylinder", "box")
@@ -171,7 +171,8 @@ class Keyframe:
 class HandCourse:
     """What a hand does in the course of time: smooth from one of the `keyframes` to the next.
 
-    It stands still at each; the last is as the first, and then it begins anew.
+    It stands still at each, and turns to it the shorter way. The last is as the first, and then it
+    begins anew.
     """
 
     keyframes: tuple[Keyframe, ...]
@@ -306,9 +307,10 @@ class _Balance(NamedTuple):
 
 
 class SimulatedHand:
-    """Fingers with these `skins`, the placement and the scene of each, around an object.
+    """Fingers with these `skins`, the placement and the scene of each, around an object `what`.
 
-    `move` it, or let it follow its `course`.
+    `move` it, or let it follow its `course`. Of a scene counts all but its stimuli; its true shape
+    has as many functions as usual at least.
     """
 
     def __init__(
@@ -317,15 +319,12 @@ class SimulatedHand:
         what: SimulatedObject,
         course: HandCourse | None = None,
     ) -> None:
-        self.skins = {  # other seeds, or the noise of all fingers were alike
-            name: (where, replace(scene, stimuli=(), seed=scene.seed + n))
-            for n, (name, (where, scene)) in enumerate(skins.items())
-        }
+        self.skins = dict[str, tuple[Placement, Scene]]()
         self.what, self.course = what, course
         self.state: HandState | None = None
         """Where the last `move` has put it; None while it follows its course."""
         self._caps = list[Cap]()
-        for name, (_, scene) in self.skins.items():
+        for n, (name, (where, scene)) in enumerate(skins.items()):
             cap = scene.plate.patch
             if not isinstance(cap, Cap) or cap.stretch != 1:
                 raise Refusal(
@@ -333,6 +332,11 @@ class SimulatedHand:
                     f"{cap.name} of finger {name!r}; take a scene such as fingertip-cap"
                 )
             self._caps.append(cap)
+            # Contacts are narrower than a scene's own loads may be; and with the same seed the
+            # noise of all fingers would be alike.
+            i, j = (max(each) for each in zip(scene.reference, usual_reference(cap), strict=True))
+            bare = replace(scene, stimuli=(), reference=(i, j), seed=scene.seed + n)
+            self.skins[name] = where, bare
         self._radii = np.array([cap.equator for cap in self._caps])
         places = [where for where, _ in self.skins.values()]
         inner = [np.array([cap.rim_radius, cap.rim_radius, -cap.equator]) for cap in self._caps]
@@ -420,7 +424,7 @@ class SimulatedHand:
                 continue
             places = np.array([one.place for one in presses])
             known = np.flatnonzero(on)
-            near = places[np.abs(np.arange(len(on))[:, None] - known).argmin(axis=1)]
+            near = places[known[np.abs(np.arange(len(on))[:, None] - known).argmin(axis=1)]]
             load = self._load(n, near[known[0]], float(forces.max()), float(forces[on].mean()))
             poses = np.column_stack([near - near[known[0]], forces / forces.max()])
             moving = Stimulus(load, RecordedMotion(times, poses))
