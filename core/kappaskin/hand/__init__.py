@@ -2,13 +2,14 @@
 
 from kappaskin.hand.description import FINGER as FINGER
 from kappaskin.hand.description import HAND as HAND
+from kappaskin.hand.description import HANDS as HANDS
+from kappaskin.hand.description import SCHEME as SCHEME
 from kappaskin.hand.description import Finger as Finger
 from kappaskin.hand.description import HandDescription as HandDescription
 from kappaskin.hand.description import Linkage as Linkage
-from kappaskin.hand.description import Placement as Placement
 from kappaskin.hand.description import angles_from_json as angles_from_json
+from kappaskin.hand.description import hand_file as hand_file
 from kappaskin.hand.description import load_hand as load_hand
-from kappaskin.hand.description import placement as placement
 from kappaskin.hand.exploration import ContactMotion as ContactMotion
 from kappaskin.hand.exploration import ObjectMap as ObjectMap
 from kappaskin.hand.exploration import ObjectMotion as ObjectMotion
@@ -22,3 +23,11 @@ from kappaskin.hand.held_object import HeldObject as HeldObject
 from kappaskin.hand.held_object import ObjectFit as ObjectFit
 from kappaskin.hand.held_object import find_held_object as find_held_object
 from kappaskin.hand.held_object import fit_object as fit_object
+from kappaskin.hand.placement import Placement as Placement
+from kappaskin.hand.placement import placement as placement
+from kappaskin.hand.simulated_hand import FingerPress as FingerPress
+from kappaskin.hand.simulated_hand import HandCourse as HandCourse
+from kappaskin.hand.simulated_hand import HandState as HandState
+from kappaskin.hand.simulated_hand import Keyframe as Keyframe
+from kappaskin.hand.simulated_hand import SimulatedHand as SimulatedHand
+from kappaskin.hand.simulated_hand import SimulatedObject as SimulatedObject
