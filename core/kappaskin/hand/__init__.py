@@ -22,3 +22,8 @@ from kappaskin.hand.held_object import HeldObject as HeldObject
 from kappaskin.hand.held_object import ObjectFit as ObjectFit
 from kappaskin.hand.held_object import find_held_object as find_held_object
 from kappaskin.hand.held_object import fit_object as fit_object
+from kappaskin.hand.operation import HandTarget as HandTarget
+from kappaskin.hand.operation import OperatorLimits as OperatorLimits
+from kappaskin.hand.operation import TargetFilter as TargetFilter
+from kappaskin.hand.operation import TargetMessage as TargetMessage
+from kappaskin.hand.operation import TargetReceiver as TargetReceiver
