@@ -27,3 +27,6 @@ from kappaskin.hand.operation import OperatorLimits as OperatorLimits
 from kappaskin.hand.operation import TargetFilter as TargetFilter
 from kappaskin.hand.operation import TargetMessage as TargetMessage
 from kappaskin.hand.operation import TargetReceiver as TargetReceiver
+from kappaskin.hand.operator_link import OperatorLink as OperatorLink
+from kappaskin.hand.operator_link import OperatorSettings as OperatorSettings
+from kappaskin.hand.operator_link import OperatorStatus as OperatorStatus
