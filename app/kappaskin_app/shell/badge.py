@@ -19,9 +19,10 @@ from kappaskin_app.widgets.text import elapsed, file_size
 LIVE, SIM, WAITING = "LIVE", "SIM", "WAITING"
 STALE, LOST, OFF = "STALE", "LOST", "OFF"
 _BESIDE = " \N{MIDDLE DOT} "  # between a source and its condition
-_GAP, _NOISY, _SATURATED, _PAUSED = "gap", "NOISE ADDED", "saturated", "paused"
+_GAP, _NOISY, _SATURATED, PAUSED = "gap", "NOISE ADDED", "saturated", "paused"
 REPLAY = "REPLAY"
 GAP = f"{REPLAY}{_BESIDE}{_GAP}"
+LATE = "LATE"  # of a haptic cue: the badge has ages
 
 _TIPS = {
     LIVE: "Readings of a connected sensor.",
@@ -35,7 +36,7 @@ _TIPS = {
     _NOISY: "Noise is added to the readings of what is shown; none of it is recorded or published.",
     _SATURATED: "Elements are beyond the range of their electronics: the skin may be bent more "
     "than shown.",
-    _PAUSED: "Paused; Ctrl+P continues.",
+    PAUSED: "Paused; Ctrl+P continues.",
 }
 
 _WIDTH, _HEIGHT, _LARGE = 8.6, 2.5, 1.54  # of the size of letters elsewhere
@@ -56,7 +57,7 @@ def is_now(
     The source is always part of it: a simulation must not be taken for a sensor. A gap precedes
     added noise, that precedes saturation, and saturation precedes a pause.
     """
-    true = ((_GAP, gap), (_NOISY, noisy), (_SATURATED, saturated), (_PAUSED, paused))
+    true = ((_GAP, gap), (_NOISY, noisy), (_SATURATED, saturated), (PAUSED, paused))
     return _BESIDE.join([word, *[below for below, holds in true if holds][:1]])
 
 
@@ -134,6 +135,7 @@ def colour_of(state: str, theme: Theme) -> str:
         SIM: theme.simulated,
         WAITING: theme.off,
         STALE: theme.warning,
+        LATE: theme.warning,
         LOST: theme.bad,
         OFF: theme.off,
         REPLAY: theme.replayed,

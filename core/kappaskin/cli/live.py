@@ -43,6 +43,7 @@ def publish(
     *,
     sources: Sources = None,
     udp: Many = None,
+    cue: Many = None,
     foxglove: Perhaps = None,
     allow_origin: Many = None,
     seconds: float = math.inf,
@@ -71,6 +72,9 @@ def publish(
         `sim:`, `sim:SCENE`, `feed:NAME`, or a port or URL for pyserial.
     udp
         HOST:PORT to send JSON datagrams to; may be given several times.
+    cue
+        HOST:PORT of a haptic device that gets what is to be felt, a thousand times a second, with
+        limits such as 127.0.0.1:9871?force=2&rate=100 in N and N/s; may be given several times.
     foxglove
         Serve Foxglove at HOST:PORT, or without one at 127.0.0.1:8765; give it after the source. Of
         a hand each finger has a server of its own, at ports that follow each other. At
@@ -95,9 +99,10 @@ def publish(
     fingers = fingers_of(source, sources, sensor)
     places = foxglove if foxglove != [] else [""]
     targets = [f"udp://{place}" for place in udp or ()]
+    targets += [f"cue://{place}" for place in cue or ()]
     targets += [f"foxglove://{place}" for place in places or ()]
     if not targets:
-        raise Refusal("expected a receiver: give --udp HOST:PORT, or --foxglove")
+        raise Refusal("expected a receiver: give --udp HOST:PORT, --cue HOST:PORT or --foxglove")
     if allow_origin and not places:
         raise Refusal("--allow-origin is for pages that connect to a server: give --foxglove")
     targets_of(targets)  # or refused here
@@ -114,7 +119,8 @@ def publish(
         lost = status.state == LOST and not status.ended
         if lost and len(fingers) == 1:
             show(f"kappaskin: {_named(finger, status.message)}", error=True)
-        failed |= lost or math.isnan(status.publishing.latency.whole)
+        cues = (target.cue.most for target in status.publishing.targets if target.cue)
+        failed |= lost or all(map(math.isnan, (status.publishing.latency.whole, *cues)))
     return FAILED if failed else 0
 
 
@@ -212,7 +218,12 @@ def _words(target: "TargetStatus") -> str:
     if target.target.startswith("foxglove"):
         return f"{text}, {len(target.receivers)} connected"
     trouble = target.receivers[0].trouble if target.receivers else "opening"
-    return f"{text} ({trouble})" if trouble else text
+    text += f" ({trouble})" if trouble else ""
+    if target.cue is None or math.isnan(target.cue.most):
+        return text
+    half, most = 1e3 * target.cue.half, 1e3 * target.cue.most
+    missed = f"{target.cue.missed} not in time"
+    return f"{text}, {missed}; {target.cue.state} within {half:.1f} ms, 99 % within {most:.1f} ms"
 
 
 _READ = 0.1  # s

@@ -275,6 +275,7 @@ class Engine:
     def publish(self, targets: Sequence[str], origins: Sequence[str] = ()) -> None:
         """Send estimates to `targets` from now on, such as udp://127.0.0.1:9870 or foxglove://.
 
+        cue://127.0.0.1:9871?force=2 is a haptic device that gets what is to be felt, 2 N at most.
         Web pages of this machine and of `origins`, such as https://app.foxglove.dev, may connect to
         a server. Earlier targets receive no more; `status` has the state of each. Raises a
         `Refusal` for an invalid target or origin.

@@ -148,7 +148,7 @@ class Reported:
             [
                 *(c * ax + s * bx, c * ay + s * by, c * az + s * bz),
                 *(c * bx - s * ax, c * by - s * ay, c * bz - s * az),
-                min(UNKNOWN, turn / (4 * h * h)) if h else UNKNOWN,
+                min(UNKNOWN, turn / (4 * h * h)) if h * h else UNKNOWN,
             ],
         )
         return self._principal

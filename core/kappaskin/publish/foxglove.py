@@ -334,6 +334,7 @@ class Foxglove:
         self._server, self._check, self._finger = server, check, finger
         invitation = check.invitation("ws", port)
         self.notices = (invitation,) if invitation else ()
+        self.cue = None
         self._clients: tuple[FoxgloveClient, ...] = ()  # replaced whole: two threads read it
         self._disconnected = (0, 0)
         self._latest: EstimateMessage | None = None

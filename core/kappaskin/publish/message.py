@@ -100,21 +100,22 @@ def epoch() -> float:
     return best[1]
 
 
-def _template(fields: Iterable[Number]) -> str:
+def template(fields: Iterable[Number]) -> str:
+    """The numbers as the inside of a JSON object, each to be filled in."""
     return ",".join(f'"{field.key}":{field.form}' for field in fields)
 
 
-_WHOLE, _HEAD_WHOLE, _SECOND = _template(CONTACT), _template(_HEAD), _template(SECOND)
+_WHOLE, _HEAD_WHOLE, _SECOND = template(CONTACT), template(_HEAD), template(SECOND)
 
 
-def _numbers(values: list[float]) -> str:
-    """Every number of `CONTACT` with its key."""
+def numbers_text(values: list[float], numbers: tuple[Number, ...], whole: str) -> str:
+    """The values of `numbers` with their keys; `whole` is the `template` of these."""
     # A sum is finite only if every number is, and takes a third of the time.
     if math.isfinite(sum(values)):
-        return _WHOLE % tuple(values)
+        return whole % tuple(values)
     return ",".join(
         f'"{field.key}":{field.form % value if math.isfinite(value) else "null"}'
-        for field, value in zip(CONTACT, values, strict=True)
+        for field, value in zip(numbers, values, strict=True)
     )
 
 
@@ -186,7 +187,8 @@ class EstimateMessage:
         flags = [_yes(flag) for flag in _flags(self._reported)]
         text = (
             f'{{{self.mark.begin("contact")}"source":"{self.mark.source}",'
-            f"{_FLAGS_TEXT % (*flags, _yes(self.shape_follows))},{_numbers(self.values)},"
+            f"{_FLAGS_TEXT % (*flags, _yes(self.shape_follows))},"
+            f"{numbers_text(self.values, CONTACT, _WHOLE)},"
             f'"second":{self._second}}}'
         )
         return text.encode()

@@ -17,6 +17,7 @@ from kappaskin.errors import Refusal, lacking
 from kappaskin.frames import Estimate
 from kappaskin.pipeline import Pipeline
 from kappaskin.publish.access import THIS_MACHINE, Access
+from kappaskin.publish.haptic_cue import CueLimits, limits_of
 from kappaskin.publish.message import EstimateMessage, MessageHeader, SourceState, epoch
 
 
@@ -49,6 +50,11 @@ class Publisher(Protocol):
         """What a person has to know of those who connect, each once."""
         ...
 
+    @property
+    def cue(self) -> "CueStatus | None":
+        """The state of the haptic cues that it sends."""
+        ...
+
     def send(self, message: EstimateMessage) -> None:
         """Send the estimate of one frame."""
         ...
@@ -63,11 +69,12 @@ class Publisher(Protocol):
 MOST_TARGETS = 8
 """Targets published to at the same time, at most."""
 
-PORTS = {"udp": 9870, "foxglove": 8765}  # PlotJuggler's and Foxglove's own
-_HOSTS = {"udp": "", "foxglove": "127.0.0.1"}
+PORTS = {"udp": 9870, "foxglove": 8765, "cue": 9871}  # PlotJuggler's and Foxglove's own
+_HOSTS = {"udp": "", "foxglove": "127.0.0.1", "cue": ""}
 _SERVERS = ("foxglove",)
 _FORM = re.compile(
-    r"(\w+)://(?:\[([0-9a-fA-F:.]+(?:%[\w.-]+)?)\]|([\w.-]*))(?::([^:/]*))?/?"  # IPv6, or a name
+    r"(\w+)://(?:\[([0-9a-fA-F:.]+(?:%[\w.-]+)?)\]|([\w.-]*))"  # IPv6, or a name
+    r"(?::([^:/?]*))?/?(?:\?(.*))?"
 )
 _LONGEST = 253  # characters of a name on the internet
 
@@ -76,7 +83,7 @@ _LONGEST = 253  # characters of a name on the internet
 class Target:
     """Destination of messages, by `scheme` their transport; `access` where others connect to it.
 
-    Of a hand it is that of one `finger`.
+    Of a hand it is that of one `finger`. Haptic cues keep the `limits`.
     """
 
     scheme: str
@@ -84,26 +91,35 @@ class Target:
     port: int
     access: Access = THIS_MACHINE
     finger: str = ""
+    limits: CueLimits = field(default_factory=CueLimits)
+
+    @property
+    def place(self) -> tuple[str, str, int]:
+        """Where it is, whatever it gets there."""
+        return self.scheme, self.host, self.port
 
     def __str__(self) -> str:
         host = f"[{self.host}]" if ":" in self.host else self.host
-        return f"{self.scheme}://{host}:{self.port}"
+        query = f"?{self.limits.query}".removesuffix("?")
+        return f"{self.scheme}://{host}:{self.port}{query}"
 
 
 def target_of(text: str) -> Target:
     """The target that `text` names; a `Refusal` for an invalid one."""
     found = _FORM.fullmatch(text.strip())
     scheme = found[1].lower() if found else ""
-    if found is None or scheme not in PORTS:
+    if found is None or scheme not in PORTS or (found[5] and scheme != "cue"):
         raise Refusal(
-            f"expected a target such as udp://127.0.0.1:9870 or foxglove://, got {text[:99]!r}"
+            "expected a target such as udp://127.0.0.1:9870, foxglove:// or "
+            f"cue://127.0.0.1:9871?force=2, got {text[:99]!r}"
         )
     host = (found[2] or found[3] or _HOSTS[scheme]).lower()
     if not host or len(host) > _LONGEST:
         raise Refusal(
             f"expected a host in front of the port, such as udp://127.0.0.1:9870, got {text[:99]!r}"
         )
-    return Target(scheme, host, _port(found[4], PORTS[scheme]))
+    port = _port(found[4], PORTS[scheme])
+    return Target(scheme, host, port, limits=limits_of(found[5] or ""))
 
 
 def _port(text: str | None, usual: int) -> int:
@@ -119,7 +135,7 @@ def targets_of(texts: Sequence[str], access: Access = THIS_MACHINE) -> tuple[Tar
     found = map(target_of, texts)
     targets = tuple(replace(t, access=access) if t.scheme in _SERVERS else t for t in found)
     for number, target in enumerate(targets):
-        if target in targets[:number]:
+        if any(target.place == one.place for one in targets[:number]):
             raise Refusal(f"{target} is given twice; give every target once")
     if len(targets) > MOST_TARGETS:
         raise Refusal(f"expected at most {MOST_TARGETS} targets, got {len(targets)}")
@@ -177,11 +193,27 @@ class Latency:
 
 
 @dataclass(frozen=True)
+class CueStatus:
+    """State of haptic cues since the last status: that of the faintest one, and its `scale`.
+
+    Percentiles in s of the time from the arrival of a frame's bytes until the first cue of its
+    estimate was sent: `half`, the median, and `most`, the 99th; `missed` counts the cues that were
+    not sent since their time had passed.
+    """
+
+    state: str = ""
+    scale: float = 1.0
+    half: float = math.nan
+    most: float = math.nan
+    missed: int = 0
+
+
+@dataclass(frozen=True)
 class TargetStatus:
     """State of a target: `opening`, refused and why, or sent to.
 
     `sent` and `dropped` count with receivers that have gone. `notices` are what a person has to
-    know of those who connect, each once.
+    know of those who connect, each once. Of a haptic device there is a `cue`.
     """
 
     target: str
@@ -191,6 +223,7 @@ class TargetStatus:
     dropped: int = 0
     receivers: tuple[Receiver, ...] = ()
     notices: tuple[str, ...] = ()
+    cue: CueStatus | None = None
 
 
 @dataclass(frozen=True)
@@ -233,7 +266,8 @@ class _OpenTarget:
         name, sender = str(self.target), self.publisher
         if sender is None:
             return TargetStatus(name, not self.refusal, self.refusal)
-        return TargetStatus(name, False, "", *sender.counts, sender.receivers, sender.notices)
+        rest = sender.receivers, sender.notices, sender.cue
+        return TargetStatus(name, False, "", *sender.counts, *rest)
 
     def close(self) -> None:
         if not self._opening.cancel() and self._opening.exception() is None:
@@ -308,6 +342,8 @@ class Publishing:
         for sender in senders:
             sender.send(message)
         ready = estimate.ready_time
+        if all(place.target.scheme == "cue" for place in self._places):
+            return  # which tells itself how late it is
         self._parts.append((began - estimate.host_time, ready - began, self._clock() - ready))
 
     def report(self, state: SourceState) -> None:

@@ -58,7 +58,7 @@ def _connected(family: int, address: object) -> socket.socket:
 class Udp:
     """Sends each message as one datagram."""
 
-    notices = ()
+    notices, cue = (), None
 
     def __init__(self, name: str, made: socket.socket, address: tuple[object, ...]) -> None:
         self._name, self._socket, self._address = name, made, address
@@ -74,14 +74,15 @@ class Udp:
         return self._sent, self._dropped
 
     def send(self, message: EstimateMessage) -> None:
-        self._put(message.contact)
+        self.put(message.contact)
         if message.shape_follows:
-            self._put(message.shape)
+            self.put(message.shape)
 
     def report(self, state: SourceState) -> None:
-        self._put(state.encoded())
+        self.put(state.encoded())
 
-    def _put(self, data: bytes) -> None:
+    def put(self, data: bytes) -> None:
+        """Send a datagram, or drop and count it."""
         if len(data) > LARGEST:
             self._drop(f"a message of {len(data)} bytes is too large for a datagram")
             return

@@ -17,7 +17,7 @@ from kappaskin_app.features.presenter.indicators import REMEDIES, age_in_words
 from kappaskin_app.features.presenter.sound import Sound
 from kappaskin_app.features.presenter.view import DEMO_OBJECTS, Hand, PresenterView
 from kappaskin_app.guard import guarded
-from kappaskin_app.shell.badge import GAP, SIM, origin
+from kappaskin_app.shell.badge import GAP, PAUSED, SIM, origin
 from kappaskin_app.shell.display import Display
 from kappaskin_app.shell.docks import drawn_once
 from kappaskin_app.shell.loads import loads_at, object_replaceable
@@ -29,6 +29,11 @@ SOUND_TIP = "A tone whose pitch and loudness follow the force, while the present
 _DRAWING_PERIOD = 0.03  # s between two drawings of the force bar
 _SETTLES = 1.0  # s in which a window that left full screen gets its size back
 _OLD = 1.0  # s after which a recognised object is discarded
+_FADED = 0.5  # scale of a haptic cue below which that is shown
+_SHOWN = 1.0  # s for which it is at least: it may last a twentieth of that
+
+
+_CUE_FADED = "The operator feels nothing: the haptic cue has faded."
 
 
 @dataclass(frozen=True)
@@ -67,6 +72,7 @@ class PresenterController(QObject):
         self._recognised: Recognised | None = None
         self._recognised_at = -math.inf
         self._next_drawing = 0.0
+        self._faded, self._faded_at = ("", ""), -math.inf
         view.controls.chosen.connect(guarded(self._select_object))
 
     @property
@@ -178,17 +184,40 @@ class PresenterController(QObject):
         if not self.on:
             return
         state, now = self._session.badge(), time.monotonic()
+        latency = self._follow_cues(status, now)
         if state not in REMEDIES:
             age = "" if self._display.old else age_in_words(*self._display.age())
-            self.view.show_trouble("", "", "")
+            shown = now - self._faded_at < _SHOWN and PAUSED not in state
+            self.view.show_trouble(*(self._faded if shown else ("", "")), _CUE_FADED)
         else:
             # Recorded data has a time in the recording, and no age.
             age = "" if state == GAP else age_in_words(now - status.last_frame)
             since = self._session.alarm().partition("\n")[0].removeprefix(state).strip()
             self.view.show_trouble(state, since, status.message.replace("`", ""))
         self._show_estimate(now)  # a paused recording, or a gap, emits no estimate
-        self.view.strip.show_state(state, _source_name(status), age)
+        self.view.strip.show_state(state, _source_name(status), age, latency)
         self._show_hand()
+
+    def _follow_cues(self, status: Status, now: float) -> str:
+        """The latency of the haptic cues of all fingers, in words; a faded one is kept for a while.
+
+        A cue fades before the badge says that there are no data.
+        """
+        fingers = self._session.fingers
+        cues = [
+            (finger, target.cue)
+            for finger, each in (fingers.status() if fingers else {"": status}).items()
+            for target in each.publishing.targets
+            if target.cue is not None
+        ]
+        for finger, cue in cues:
+            if cue.scale < _FADED and cue.state.upper() in REMEDIES:
+                self._faded, self._faded_at = (cue.state.upper(), finger), now
+        known = [cue for _, cue in cues if math.isfinite(cue.most)]
+        if not known:
+            return ""
+        half, most = (1e3 * max(getattr(cue, name) for cue in known) for name in ("half", "most"))
+        return f"haptic cue {half:.1f} ms after the data, 99 % within {most:.1f} ms"
 
     def _show_hand(self) -> None:
         """Show the position of the simulated hand, if there is one."""

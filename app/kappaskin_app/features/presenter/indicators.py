@@ -8,7 +8,7 @@ from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPainterPath, 
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from kappaskin_app.features.presenter.feedback import RadiusEstimate
-from kappaskin_app.shell.badge import GAP, LOST, OFF, STALE, WAITING, colour_of
+from kappaskin_app.shell.badge import GAP, LATE, LOST, OFF, STALE, WAITING, colour_of
 from kappaskin_app.shell.colouring import SteadyRange
 from kappaskin_app.theme import current
 from kappaskin_app.widgets.lettering import (
@@ -98,21 +98,21 @@ _PAD = 28.0  # units beside the word
 
 
 class StatusStrip(Indicator):
-    """State in its colour, name of the source, and age of the data."""
+    """State in its colour, name of the source, latency of the haptic cue, and age of the data."""
 
     def __init__(self) -> None:
         super().__init__()
-        self.state, self.source, self.age = OFF, "", ""
+        self.state, self.source, self.age, self.latency = OFF, "", "", ""
         self.edge = 0.0  # px, margin on both sides
 
     def show_unit(self, unit: float) -> None:
         super().show_unit(unit)
         self.fix_height(STRIP_HEIGHT)
 
-    def show_state(self, state: str, source: str, age: str) -> None:
-        if (state, source, age) != (self.state, self.source, self.age):
-            self.state, self.source, self.age = state, source, age
-            self.setAccessibleName(f"{state}, {source}, {age}")
+    def show_state(self, state: str, source: str, age: str, latency: str = "") -> None:
+        if (state, source, age, latency) != (self.state, self.source, self.age, self.latency):
+            self.state, self.source, self.age, self.latency = state, source, age, latency
+            self.setAccessibleName(", ".join(filter(None, (state, source, age, latency))))
             self.update()
 
     @property
@@ -136,7 +136,11 @@ class StatusStrip(Indicator):
         shown.append(Words(self.age, large, age, align=RIGHT))
         left = badge.right() + _PAD * self.unit
         place = QRectF(left, 0, max(age.left() - left - _PAD * self.unit, 1.0), self.height())
-        shown.append(shrunk(Words(self.source, self.letters(SECONDARY), place, align=LEFT)))
+        lines = [line for line in (self.source, self.latency) if line]
+        high = place.height() / max(len(lines), 1)
+        for number, line in enumerate(lines):
+            part = QRectF(place.left(), number * high, place.width(), high)
+            shown.append(shrunk(Words(line, self.letters(SECONDARY), part, align=LEFT)))
         return shown
 
 
@@ -156,6 +160,8 @@ REMEDIES = {
     LOST: "Check the cable and the power; retrying. Ctrl+Return connects again, Ctrl+M simulates "
     "instead.",
     STALE: "Wait. If this state lasts, check the cable, then press Ctrl+Return to connect again.",
+    LATE: "Data come, but are too old to be felt. If this state lasts, close other programs, or "
+    "press Esc and choose fewer functions.",
     WAITING: "Waiting for the first reading. If this state lasts, press Esc and see Connection.",
     OFF: "Ctrl+Return connects the selected source, Ctrl+M simulates. To select another source, "
     "press Esc.",
@@ -164,7 +170,11 @@ REMEDIES = {
 }
 """What to do in each state in which no new data is shown."""
 
+STATE = 135.0
+"""Units that a capital of a state without data is high: an eighth of the view."""
+
 _BANNER_MARGIN = 36.0  # units
+_LINE = 1.7  # height of a line by that of its capitals
 _REASON_SHARE = 0.45  # of the height below the state: most that the reason takes
 _TOP = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop
 
@@ -193,12 +203,18 @@ class Banner(Indicator):
         return "#ffffff"
 
     def words(self) -> list[Words]:
-        """The state, the reason in at most its share of the height, and the remedy below."""
-        edge = _BANNER_MARGIN * self.unit
+        """The state, since when, the reason in at most its share of the height, and the remedy."""
+        edge, head, shown = _BANNER_MARGIN * self.unit, 0.0, list[Words]()
         inside = QRectF(self.rect()).adjusted(edge, edge, -edge, -edge)
-        head, rest = 2 * PRIMARY * self.unit, inside.height() - 2 * PRIMARY * self.unit
-        title = f"{self.state} {self.since}".strip()
-        shown, share = [self._paragraph(title, PRIMARY, inside.adjusted(0, 0, 0, -rest))], 0.0
+        for text, capital in ((self.state, STATE), (self.since, PRIMARY)):
+            if text:
+                high = _LINE * capital * self.unit
+                place = QRectF(inside.left(), inside.top() + head, inside.width(), high)
+                shown.append(
+                    shrunk(Words(text, self.letters(capital, bold=True), place, align=_TOP))
+                )
+                head += high
+        rest, share = inside.height() - head, 0.0
         if self.why:
             share = _REASON_SHARE * rest
             why = self._paragraph(self.why, SECONDARY, inside.adjusted(0, head, 0, share - rest))

@@ -11,7 +11,10 @@ from kappaskin_app.shell.pages import LIVE
 from kappaskin_app.shell.window import MainWindow
 from kappaskin_app.widgets.parts import ELLIPSIS, text_label
 
-_NAMES = ("send_udp", "udp_to", "serve_foxglove", "foxglove_at", "allowed_pages")
+_NAMES = (
+    *("send_udp", "udp_to", "send_cues", "cues_to"),
+    *("serve_foxglove", "foxglove_at", "allowed_pages"),
+)
 _EVERY = 0.5  # s between two updates of the counts
 _TIP = (
     "Messages sent to each receiver, and those dropped because it was not ready or not found. "
@@ -32,8 +35,8 @@ class PublishPanel(Form):
     """Settings of receivers; shows what each gets, and errors."""
 
     purpose = (
-        "Sends the contact with its error bars to other programs, as JSON by UDP or to Foxglove; "
-        "example receivers come with the library."
+        "Sends the contact with its error bars to other programs, as JSON by UDP or to Foxglove, "
+        "and what is to be felt to haptic devices; example receivers come with the library."
     )
     guide_page = "record"
 
@@ -75,10 +78,15 @@ def _words(target: TargetStatus) -> list[str]:
         return [f"{target.target}: connecting{ELLIPSIS}"]
     serving = target.target.startswith("foxglove")
     name = target.target.removeprefix("udp://").removeprefix("foxglove://")
+    name = name.replace("cue://", "cues to ")
     lines = [f"{name}, {len(target.receivers)} connected" if serving else name]
     for receiver in target.receivers:
         who = f"{receiver.name}: " if serving else ""
         trouble = f", {receiver.trouble}" if receiver.trouble else ""
         counts = f"{receiver.sent:,} sent, {receiver.dropped:,} dropped"
         lines.append(f"    {who}{counts}{trouble}")
+    if target.cue is not None and math.isfinite(target.cue.most):
+        half, most = 1e3 * target.cue.half, 1e3 * target.cue.most
+        lines.append(f"    bytes in to cue out: {half:.1f} ms, 99 % within {most:.1f} ms")
+        lines.append(f"    {target.cue.missed:,} not in time, {target.cue.state}")
     return lines

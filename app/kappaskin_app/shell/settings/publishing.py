@@ -7,7 +7,7 @@ from kappaskin_app.shell.settings.form_fields import Switch, Text, setting
 
 @dataclass(frozen=True)
 class PublishSettings:
-    """UDP and Foxglove, each with its address; both are off by default."""
+    """UDP, haptic cues and Foxglove, each with its address; all are off by default."""
 
     send_udp: bool = setting(
         False,
@@ -20,6 +20,23 @@ class PublishSettings:
     udp_to: str = setting(
         "127.0.0.1:9870",
         Text("To", "HOST:PORT of the receiver; separate several receivers by commas."),
+    )
+    send_cues: bool = setting(
+        False,
+        Switch(
+            "Haptic cues",
+            "Send a haptic device what is to be felt, a thousand times a second: force, direction, "
+            "curvature and slip. They fade to nothing within 100 ms where data are old or lost.",
+        ),
+    )
+    cues_to: str = setting(
+        "127.0.0.1:9871",
+        Text(
+            "Device",
+            "HOST:PORT of the device. Limits may follow, as in 127.0.0.1:9871?force=2&rate=100: "
+            "force in N, 3 without one, rate of its change in N/s, 100, curvature in 1/m, 200, and "
+            "slip in m/s, 0.5. Separate several devices by commas.",
+        ),
     )
     serve_foxglove: bool = setting(
         False,
@@ -51,8 +68,10 @@ class PublishSettings:
     def targets(self) -> list[str]:
         """The enabled targets, as addresses of the engine."""
         udp = [f"udp://{place.strip()}" for place in self.udp_to.split(",")]
+        cues = [f"cue://{place.strip()}" for place in self.cues_to.split(",")]
         foxglove = [f"foxglove://{self.foxglove_at.strip()}"]
-        return (udp if self.send_udp else []) + (foxglove if self.serve_foxglove else [])
+        on = (udp, self.send_udp), (cues, self.send_cues), (foxglove, self.serve_foxglove)
+        return [target for targets, switched_on in on if switched_on for target in targets]
 
     @property
     def origins(self) -> list[str]:

@@ -12,7 +12,7 @@ from PySide6.QtGui import QFontMetricsF
 from kappaskin_app.features.presenter.feedback import Feedback, RadiusEstimate
 from kappaskin_app.features.presenter.indicators import REMEDIES, age_in_words
 from kappaskin_app.features.presenter.view import Hand, PresenterView
-from kappaskin_app.shell.badge import GAP, LIVE, LOST, OFF, SIM, STALE, WAITING
+from kappaskin_app.shell.badge import GAP, LATE, LIVE, LOST, OFF, SIM, STALE, WAITING
 from kappaskin_app.theme import THEMES, apply_look
 from kappaskin_app.widgets.colour_bar import SkinScale
 from kappaskin_app.widgets.lettering import CAPTION, PRIMARY
@@ -103,13 +103,13 @@ def test_every_text_fits_and_is_not_made_smaller(size, qtbot) -> None:
 
 
 @pytest.mark.parametrize("size", SIZES)
-@pytest.mark.parametrize("state", [LOST, STALE, WAITING, OFF, GAP])
+@pytest.mark.parametrize("state", [LOST, STALE, LATE, WAITING, OFF, GAP])
 def test_what_to_do_fits_whole(size, state, qtbot) -> None:
     view = view_of(size, qtbot)
     view.show_trouble(state, "1234 s", WHY)
     assert view.pages.currentWidget() is view.banner
     words = view.banner.words()
-    assert [said.text for said in words] == [f"{state} 1234 s", WHY, REMEDIES[state]]
+    assert [said.text for said in words] == [state, "1234 s", WHY, REMEDIES[state]]
     assert all(said.fits for said in words)
     tops = [said.place.top() for said in words]
     assert tops == sorted(tops)
@@ -129,9 +129,30 @@ def test_numbers_are_legible_from_three_metres(qtbot) -> None:
                 texts.remove(words.text)
     assert not texts
     view.show_trouble(LOST, "3 s", WHY)
-    head, why, remedy = view.banner.words()
-    assert QFontMetricsF(head.font).capHeight() >= CAPITAL
+    _, since, why, remedy = view.banner.words()
+    assert QFontMetricsF(since.font).capHeight() >= CAPITAL
     assert min(QFontMetricsF(w.font).capHeight() for w in (why, remedy)) >= CAPITAL / 2
+    view.close()
+
+
+@pytest.mark.parametrize("state", [LOST, STALE, LATE])
+def test_a_link_without_data_is_told_in_letters_of_an_eighth_of_the_height(state, qtbot) -> None:
+    view = view_of((1920, 1080), qtbot)
+    view.show_trouble(state, "index", WHY)
+    said = view.banner.words()[0]
+    assert (said.text, said.fits) == (state, True)
+    assert QFontMetricsF(said.font).capHeight() >= 1080 / 8
+    view.close()
+
+
+def test_the_latency_of_the_cue_is_below_the_source(qtbot) -> None:
+    view = view_of((1280, 720), qtbot)
+    view.strip.show_state(LIVE, "Second-generation fingertip", "12 ms old", "haptic cue 1.0 ms")
+    words = {said.text: said for said in view.strip.words()}
+    source, latency = words["Second-generation fingertip"], words["haptic cue 1.0 ms"]
+    assert source.fits
+    assert latency.fits
+    assert latency.place.top() >= source.place.bottom() - 1
     view.close()
 
 

@@ -11,7 +11,7 @@ from websockets.exceptions import WebSocketException
 from websockets.sync.client import connect
 
 from kappaskin import Status
-from kappaskin.publish import Latency, PublishStatus, TargetStatus
+from kappaskin.publish import CueStatus, Latency, PublishStatus, TargetStatus
 from kappaskin.publish.publishing import Receiver
 from kappaskin_app.features.publish import PublishPanel
 from kappaskin_app.shell.settings import Settings
@@ -51,6 +51,8 @@ def test_settings_name_the_targets() -> None:
     both = Settings(send_udp=True, udp_to="robot:1, [::1]:2", serve_foxglove=True)
     assert both.targets == ["udp://robot:1", "udp://[::1]:2", "foxglove://127.0.0.1:8765"]
     assert replace(both, send_udp=False).targets == ["foxglove://127.0.0.1:8765"]
+    felt = Settings(send_cues=True, cues_to="glove:1?force=2, stick")
+    assert felt.targets == ["cue://glove:1?force=2", "cue://stick"]
 
 
 def test_every_receiver_is_told_with_what_it_got(panel: PublishPanel) -> None:
@@ -59,6 +61,15 @@ def test_every_receiver_is_told_with_what_it_got(panel: PublishPanel) -> None:
     assert "0 sent, 7 dropped, nobody receives there" in text
     assert "8765, 1 connected\n    127.0.0.1:50000: 90 sent, 2 dropped, too slow" in text
     assert panel.late.text() == "99 % within 2.4 ms"
+
+
+def test_a_haptic_device_is_told_with_how_late_its_cues_are(panel: PublishPanel) -> None:
+    cue = CueStatus("live", 1.0, 1.04e-3, 2.5e-3, 1234)
+    name = "cue://glove:9871?force=2"
+    text = told(panel, TargetStatus(name, receivers=(Receiver(name, 12345, 6),), cue=cue))
+    assert "cues to glove:9871?force=2\n    12,345 sent, 6 dropped" in text
+    assert "bytes in to cue out: 1.0 ms, 99 % within 2.5 ms" in text
+    assert "1,234 not in time, live" in text
 
 
 def test_what_is_looked_for_or_refused_says_so(panel: PublishPanel) -> None:
@@ -102,7 +113,7 @@ def test_what_comes_of_it_is_in_sight_of_who_asked(qtbot, until) -> None:
     panel, other = PublishPanel(), QLineEdit()
     page = scrolled(other, QLabel("\n" * 40), panel)
     qtbot.addWidget(page)
-    page.resize(300, 280)
+    page.resize(300, 331)  # as high as the panel with its counts
     page.show()
     page.activateWindow()
     box, bar = panel.editor("serve_foxglove"), page.verticalScrollBar()
