@@ -113,6 +113,7 @@ def calibrate(
     """
     from kappaskin.calibration import Calibration, take_sweep
     from kappaskin.calibration import calibrate as calibrated
+    from kappaskin.hand import load_hand as load_hand  # registers hand:
     from kappaskin.recording import ReplayedSource as ReplayedSource  # registers replay:
 
     check_output(out, source.removeprefix("sim:"), *filter(None, [sensor]))
@@ -198,6 +199,7 @@ def tare(
     # All of it before the source is opened: while modules load, readings wait.
     from kappaskin.calibration import TareMeasurement, TareStore
     from kappaskin.contact import LoadDetector
+    from kappaskin.hand import load_hand as load_hand  # registers hand:
     from kappaskin.recording import ReplayedSource as ReplayedSource  # registers replay:
     from kappaskin.sources import open_source
 
@@ -294,6 +296,7 @@ def press(
         Print one JSON object with every press and the map that was found.
     """
     from kappaskin.calibration import press_elements
+    from kappaskin.hand import load_hand as load_hand  # registers hand:
     from kappaskin.recording import ReplayedSource as ReplayedSource  # registers replay:
 
     try:

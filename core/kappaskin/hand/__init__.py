@@ -2,13 +2,14 @@
 
 from kappaskin.hand.description import FINGER as FINGER
 from kappaskin.hand.description import HAND as HAND
+from kappaskin.hand.description import HANDS as HANDS
+from kappaskin.hand.description import SCHEME as SCHEME
 from kappaskin.hand.description import Finger as Finger
 from kappaskin.hand.description import HandDescription as HandDescription
 from kappaskin.hand.description import Linkage as Linkage
-from kappaskin.hand.description import Placement as Placement
 from kappaskin.hand.description import angles_from_json as angles_from_json
+from kappaskin.hand.description import hand_file as hand_file
 from kappaskin.hand.description import load_hand as load_hand
-from kappaskin.hand.description import placement as placement
 from kappaskin.hand.exploration import ContactMotion as ContactMotion
 from kappaskin.hand.exploration import ObjectMap as ObjectMap
 from kappaskin.hand.exploration import ObjectMotion as ObjectMotion
@@ -30,3 +31,11 @@ from kappaskin.hand.operation import TargetReceiver as TargetReceiver
 from kappaskin.hand.operator_link import OperatorLink as OperatorLink
 from kappaskin.hand.operator_link import OperatorSettings as OperatorSettings
 from kappaskin.hand.operator_link import OperatorStatus as OperatorStatus
+from kappaskin.hand.placement import Placement as Placement
+from kappaskin.hand.placement import placement as placement
+from kappaskin.hand.simulated_hand import FingerPress as FingerPress
+from kappaskin.hand.simulated_hand import HandCourse as HandCourse
+from kappaskin.hand.simulated_hand import HandState as HandState
+from kappaskin.hand.simulated_hand import Keyframe as Keyframe
+from kappaskin.hand.simulated_hand import SimulatedHand as SimulatedHand
+from kappaskin.hand.simulated_hand import SimulatedObject as SimulatedObject

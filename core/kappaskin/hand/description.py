@@ -1,8 +1,10 @@
 """A hand: the sensors of its fingers, and where each skin is in the hand's frame."""
 
 import math
+import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from importlib.resources import files
 from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
@@ -14,56 +16,23 @@ from kappaskin._schema import Key, Part, Unit, Within
 from kappaskin._toml import TomlTable, json_table, parsed
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
-from kappaskin.scenes import Trust, named_file
-from kappaskin.sources import is_finger
+from kappaskin.hand.placement import IDENTITY, Placement, Triple, placement, rotation_about
+from kappaskin.hand.simulated_hand import (
+    SHAPES,
+    HandCourse,
+    Keyframe,
+    SimulatedHand,
+    SimulatedObject,
+)
+from kappaskin.scenes import Scene, Trust, load_scene, named_file
+from kappaskin.sources import SimulatedSource, is_finger, register_scheme
 
 FORMAT = 1
 _LARGEST = 2**22  # bytes of a hand's file or of a URDF
 _MOST_FINGERS = 64
 _FIXED, _TURNS, _SLIDES = ("fixed",), ("revolute", "continuous"), ("prismatic",)
 
-Triple = tuple[float, float, float]
 Angles = Mapping[str, float]
-
-
-class Placement(NamedTuple):
-    """Where a frame is in another: points x of it are at `rotation` x + `position`.
-
-    `rotation` (3, 3) is orthonormal, `position` (3,) in m.
-    """
-
-    rotation: Array
-    position: Array
-
-    def of(self, inner: "Placement") -> "Placement":
-        """Where a frame is that is at `inner` in this one."""
-        return Placement(
-            self.rotation @ inner.rotation, self.rotation @ inner.position + self.position
-        )
-
-
-IDENTITY = Placement(np.eye(3), np.zeros(3))
-
-
-def placement(position: Triple, rotation: Triple) -> Placement:
-    """The placement at `position` in m, turned by `rotation` in rad: roll, pitch and yaw.
-
-    About the fixed axes x, then y, then z, as URDF has it.
-    """
-    (a, b, c), (d, e, f) = np.cos(rotation), np.sin(rotation)
-    R = [
-        [c * b, c * e * d - f * a, c * e * a + f * d],
-        [f * b, f * e * d + c * a, f * e * a - c * d],
-        [-e, b * d, b * a],
-    ]
-    return Placement(np.array(R), np.array(position, float))
-
-
-def rotation_about(axis: Array, angle: float) -> Array:
-    """The rotation (3, 3) by `angle` in rad about the unit vector `axis` (3,)."""
-    x, y, z = axis
-    across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + math.sin(angle) * across + 2 * math.sin(angle / 2) ** 2 * across @ across
 
 
 @dataclass(frozen=True)
@@ -231,11 +200,16 @@ def _values(text: str, count: int, key: str, joint: str) -> list[float]:
 
 @dataclass(frozen=True, eq=False)
 class HandDescription:
-    """A hand with `fingers`; with a `linkage`, their links move as its joints do."""
+    """A hand with `fingers`; with a `linkage`, their links move as its joints do.
+
+    A hand that is `simulated` with an object closes its fingers on it.
+    """
 
     title: str
     fingers: tuple[Finger, ...]
     linkage: Linkage | None = None
+    simulated: SimulatedHand | None = None
+    text: str = ""
 
     def __post_init__(self) -> None:
         names = [finger.name for finger in self.fingers]
@@ -260,11 +234,16 @@ class HandDescription:
         """The limits in rad or m of each joint whose value `placements` needs."""
         return {} if self.linkage is None else self.linkage.joints
 
-    def placements(self, angles: Angles | None = None) -> dict[str, Placement]:
+    def placements(
+        self, angles: Angles | None = None, now: float | None = None
+    ) -> dict[str, Placement]:
         """Where each finger's skin is in the hand's frame, by name.
 
-        `angles` has the value of each joint in rad or m.
+        `angles` has the value of each joint in rad or m. A simulated hand without them is where its
+        course has it `now` on the monotonic clock in s, or where it was last moved to.
         """
+        if self.simulated is not None and angles is None:
+            return self.simulated.placements(time.monotonic() if now is None else now)
         found = dict[str, Placement]()
         for finger in self.fingers:
             own = placement(finger.position, finger.rotation)
@@ -279,6 +258,7 @@ HAND = Part(
     {
         "format": Key("Format", "The format of the file: 1.", kind=int, offered=False),
         "title": Key("Title", "The name of the hand.", kind=str, default=""),
+        "text": Key("Text", "Description of the hand.", kind=str, default="", offered=False),
         "urdf": Key(
             "URDF",
             "A file with the hand's links and joints, beside this one.",
@@ -324,8 +304,60 @@ FINGER = Part(
 )
 
 
+_MM = Unit("m", "mm", 1e-3)
+OBJECT = Part(
+    "Object",
+    {
+        "shape": Key("Shape", "Its shape.", choices=tuple((one, one) for one in SHAPES)),
+        "radius": Key("Radius", "Of a ball or a cylinder.", _MM),
+        "length": Key("Length", "Of a cylinder, along its x.", _MM),
+        "sides": Key("Sides", "Of a box, along its x, y and z.", _MM),
+        "mass": Key("Mass", "What the fingers lift.", Unit.same("kg")),
+        "friction": Key("Friction", "Coefficient of friction on the skins."),
+        "held": Key("Held", "Whether the fingers bear it; else it stands on something."),
+    },
+    (SimulatedObject,),
+)
+KEYFRAME = Part(
+    "Keyframe",
+    {
+        "time": Key("Time", "Time from the beginning of the course.", Unit.same("s")),
+        "position": Key(
+            "Position", "Place of the object's middle.", _MM, limits=Within(-1, 1, "m")
+        ),
+        "rotation": Key("Rotation", "Roll, pitch and yaw of the object.", _DEGREE),
+        "grip": Key("Grip", "Mean normal force of the fingers that touch.", Unit.same("N")),
+    },
+    (Keyframe,),
+)
+
+SCHEME = "hand:"
+"""Begins the names of fingers of simulated hands: `hand:NAME#FINGER`, or `hand:FILE#FINGER`."""
+
+_FOLDER = Path(str(files("kappaskin_resources"))) / "hands"
+_ENDING = ".toml"
+HANDS = tuple(sorted(file.stem for file in _FOLDER.iterdir() if file.suffix == _ENDING))
+"""Names of the ready hands."""
+
+
+def hand_file(name: str) -> Path:
+    """The file of the ready hand `name`, or the TOML file named."""
+    if name.endswith(_ENDING):
+        return Path(name)
+    if name not in HANDS:
+        raise Refusal(
+            f"expected a hand among {', '.join(HANDS)}, or a file that ends in {_ENDING}; got "
+            f"{name!r}"
+        )
+    return _FOLDER / f"{name}{_ENDING}"
+
+
 def load_hand(file: Path, trust: Trust = False) -> HandDescription:
-    """The hand that the TOML `file` describes; `trust` as of `kappaskin.scenes.named_file`."""
+    """The hand that the TOML `file` describes; `trust` as of `kappaskin.scenes.named_file`.
+
+    With an [object] it is simulated: each finger's source is then its part of that, on the skin
+    that the file has for it.
+    """
     text = _text(file, "a hand")
     top = TomlTable(parsed(text, file, "a hand"), text, str(file))
     if (version := HAND.value(top, "format")) != FORMAT:
@@ -339,9 +371,63 @@ def load_hand(file: Path, trust: Trust = False) -> HandDescription:
         fingers.append(FINGER.make(one, Finger))
         one.done()
     title = HAND.value(top, "title") or file.stem
-    top.done()
     with top.blamed():
-        return HandDescription(title, tuple(fingers), linkage)
+        hand = HandDescription(title, tuple(fingers), linkage, text=HAND.value(top, "text"))
+        if "object" in top or "course" in top:
+            hand = _simulated(hand, top, file, trust)
+    top.done()
+    return hand
+
+
+def _simulated(hand: HandDescription, top: TomlTable, file: Path, trust: Trust) -> HandDescription:
+    """The `hand` around the [object] in its file, on the skins of its fingers."""
+    table, keyframes = top.table("object"), list[Keyframe]()
+    what = OBJECT.make(table, SimulatedObject)
+    table.done()
+    for one in top.tables("course"):
+        moved = one.table("fingers")
+        by = {name: moved.get(name, Triple, within=Within(-1, 1, "m")) for name in moved}
+        keyframes.append(KEYFRAME.make(one, Keyframe, fingers=by))
+        one.done()
+    skins, where = dict[str, tuple[Placement, Scene]](), hand.placements()
+    for one, finger in zip(top.tables("finger"), hand.fingers, strict=True):
+        with one.blamed("source"):
+            skins[finger.name] = where[finger.name], _skin(finger, file, trust)
+    course = None
+    if keyframes:
+        with top.blamed("course"):
+            course = HandCourse(tuple(keyframes))
+    name = file.stem if file.parent == _FOLDER else str(file)
+    fingers = tuple(replace(one, source=f"{SCHEME}{name}#{one.name}") for one in hand.fingers)
+    return replace(hand, fingers=fingers, simulated=SimulatedHand(skins, what, course))
+
+
+def _skin(finger: Finger, file: Path, trust: Trust) -> Scene:
+    """The scene that a finger of a simulated hand has as its source, without its stimuli."""
+    if not finger.source.startswith(SimulatedSource.SCHEME):
+        raise Refusal(
+            f"expected a scene for each finger around an [object], such as sim:fingertip-cap, got "
+            f"{finger.source!r:.80}"
+        )
+    name = finger.source.removeprefix(SimulatedSource.SCHEME)
+    if name.endswith(_ENDING):
+        name = str(named_file(name, file.parent, trust, "hand"))
+    return replace(load_scene(name, trust), stimuli=())
+
+
+def _open(name: str, trust: bool) -> SimulatedSource:
+    """The source of a finger, NAME#FINGER or FILE#FINGER."""
+    hand, _, finger = name.rpartition("#")
+    simulated = load_hand(hand_file(hand), trust).simulated if hand else None
+    if simulated is None or finger not in simulated.skins:
+        one = "" if simulated is None else f" with a finger among {', '.join(simulated.skins)}"
+        raise Refusal(
+            f"expected {SCHEME}NAME#FINGER of a hand with an [object]{one}, got {SCHEME}{name}"
+        )
+    return SimulatedSource(simulated.course_scenes[finger], follows_clock=True)
+
+
+register_scheme(SCHEME, _open)
 
 
 def _text(file: Path, what: str) -> str:

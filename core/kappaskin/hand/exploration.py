@@ -13,9 +13,9 @@ from kappaskin._files import read_file, write_whole
 from kappaskin.errors import Refusal
 from kappaskin.estimation import propagated_covariance
 from kappaskin.frames import Array
-from kappaskin.hand.description import IDENTITY, Placement
 from kappaskin.hand.grasp import FingerContact, Grasp
 from kappaskin.hand.held_object import ObjectFit
+from kappaskin.hand.placement import IDENTITY, Placement
 
 _NIL = 1e-11  # of the largest information: less is none
 _HIDDEN = 1e-6  # of what is unknown: as much of it leaves a number unknown

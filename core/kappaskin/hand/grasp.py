@@ -11,7 +11,8 @@ import numpy as np
 from kappaskin.errors import Refusal
 from kappaskin.estimation import Fit, propagated_covariance
 from kappaskin.frames import Array, Estimate
-from kappaskin.hand.description import Finger, Placement
+from kappaskin.hand.description import Finger
+from kappaskin.hand.placement import Placement
 
 _AXES = np.eye(3)
 

@@ -18,6 +18,7 @@ import numpy as np
 from kappaskin._processes import ProcessPriority
 from kappaskin.errors import EndedSource, Refusal, SourceError
 from kappaskin.frames import Event, Frame
+from kappaskin.hand import load_hand as load_hand  # registers hand:
 from kappaskin.live.pipelines import (
     ComparedPipeline,
     LiveHealthMonitor,

@@ -18,6 +18,7 @@ from kappaskin.scenes.read import read_scene_text as read_scene_text
 from kappaskin.scenes.read import read_skin as read_skin
 from kappaskin.scenes.read import scene_file as scene_file
 from kappaskin.scenes.read import scene_of as scene_of
+from kappaskin.scenes.read import usual_reference as usual_reference
 from kappaskin.scenes.scene import AppliedLoads as AppliedLoads
 from kappaskin.scenes.scene import EffectSelection as EffectSelection
 from kappaskin.scenes.scene import LoadingHistory as LoadingHistory
@@ -26,7 +27,9 @@ from kappaskin.scenes.scene import Scene as Scene
 from kappaskin.scenes.scene import scaled_to as scaled_to
 from kappaskin.scenes.schema import PARTS as PARTS
 from kappaskin.scenes.simulator import Simulator as Simulator
+from kappaskin.scenes.stimulus import EASES as EASES
 from kappaskin.scenes.stimulus import Indenter as Indenter
 from kappaskin.scenes.stimulus import Orbit as Orbit
+from kappaskin.scenes.stimulus import RecordedMotion as RecordedMotion
 from kappaskin.scenes.stimulus import Stimulus as Stimulus
 from kappaskin.scenes.write import write_scene as write_scene

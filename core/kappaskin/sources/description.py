@@ -209,7 +209,7 @@ class Description:
 
 SCHEME = "sensor:"
 """Prefix of the names of sources of described sensors."""
-_DESCRIBED = ("sim:", "replay:", "feed:", SCHEME)
+_DESCRIBED = ("sim:", "hand:", "replay:", "feed:", SCHEME)
 
 
 def described_source(file: Path, source: str) -> str:

@@ -43,6 +43,8 @@ class SimulatedSource:
     """Yields the frames of a scene at its rate; scene and scan may change while it plays.
 
     Where its frames cannot be computed in real time its own time goes slower, and none is lost.
+    With `follows_clock` the scene's time is that of the clock nevertheless, from its zero on: two
+    sources that share a clock show the same moment of a course.
     Another skin, other elements or electronics are another device on the same line: `sensor` is
     then another one.
     """
@@ -55,10 +57,12 @@ class SimulatedSource:
         scene: Scene,
         clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
+        follows_clock: bool = False,
     ) -> None:
-        self._clock, self._sleep = clock, sleep
+        self._clock, self._sleep, self._follows = clock, sleep, follows_clock
         self._start, self._n = clock(), 0
-        self._become(scene, 0.0, Playback())
+        begin = self._start % scene.duration if follows_clock else 0.0
+        self._become(scene, 0.0, Playback(begin))
         self._base_noise = np.random.default_rng(scene.seed)
         self._taken = 0.0  # device time of the last frame
         self._accepted = self._lost = 0
@@ -179,6 +183,9 @@ class SimulatedSource:
         late = now - self._start - self._due()
         if late > max(_BACKLOG, 1 / self._rate):
             self._start += late
+            if self._follows:
+                now_at = self.playing.time(self._due()) + self.playing.speed * late
+                self.seek(now_at, self.playing.speed)
             if self._recorder is not None:
                 self._record_clock(self._recorder)
         frames: list[Frame] = []
