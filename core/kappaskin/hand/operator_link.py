@@ -88,7 +88,7 @@ def _address(text: str) -> tuple[str, int]:
             return host, port
     except ValueError:
         pass
-    raise Refusal(f"expected HOST:PORT such as 127.0.0.1:9871, got {text[:60]!r}")
+    raise Refusal(f"expected HOST:PORT such as 127.0.0.1:9875, got {text[:60]!r}")
 
 
 class _Socket:

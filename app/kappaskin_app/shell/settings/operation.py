@@ -35,7 +35,7 @@ class OperationSettings:
         ),
     )
     operator_listens: str = setting(
-        "127.0.0.1:9871",
+        "127.0.0.1:9875",
         Text(
             "Listen at",
             "HOST:PORT for targets by UDP. 127.0.0.1 takes those of this machine only, 0.0.0.0 "
@@ -71,7 +71,7 @@ class OperationSettings:
             "come by UDP.",
         ),
     )
-    robot_at: str = setting("127.0.0.1:9872", Text("Robot at", "HOST:PORT of the robot."))
+    robot_at: str = setting("127.0.0.1:9876", Text("Robot at", "HOST:PORT of the robot."))
 
     @property
     def operator_reach(self) -> tuple[float, float, float]:
