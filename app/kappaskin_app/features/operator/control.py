@@ -53,12 +53,14 @@ class OperatorControl(QObject):
     """Follows the input while it is `enabled`; off at first.
 
     `reported` brings the status, about 25 times a second; `switched` whether it is enabled;
-    `refused` why nothing moves, empty where it may. `followers` get each target that is followed.
+    `refused` why the process does not run, `ended` that it has ended. `followers` get each target
+    that is followed.
     """
 
     reported = Signal(OperatorStatus)
     switched = Signal(bool)
     refused = Signal(str)
+    ended = Signal()
 
     def __init__(self, history: History, devices: Mapping[str, InputDevice]) -> None:
         super().__init__()
@@ -164,4 +166,5 @@ class OperatorControl(QObject):
         if self.link is not None:
             link, self.link = self.link, None
             link.close()
+            self.ended.emit()
         self.switch(False)

@@ -30,6 +30,8 @@ _NAMES = (
     "operator_reach_z",
     "send_to_robot",
     "robot_at",
+    "operator_tones",
+    "felt_at_most",
 )
 _LETTERS = 1.5  # times as large is the state
 _WORDS = {
@@ -52,7 +54,7 @@ _PERCENT = 100
 
 
 class OperatorForm(Form):
-    """The settings of the input, its limits and the robot."""
+    """The settings of the input, its limits, the robot and what is felt."""
 
     purpose = (
         "Moves the simulated hand, or a robot by UDP, with the pad, a gamepad or a glove. Limits "
@@ -61,7 +63,7 @@ class OperatorForm(Form):
     guide_page = "telemanipulation"
 
     def __init__(self) -> None:
-        super().__init__("Input and limits", _NAMES)
+        super().__init__("Input, limits, feedback", _NAMES)
 
     def show_settings(self, settings: Settings) -> None:
         super().show_settings(settings)

@@ -58,7 +58,7 @@ class OperationSettings:
         ),
     )
     operator_grip: float = setting(
-        3.0, Range("Grip", "Largest force with which each finger grips.", 0.1, 50.0, 0.5, 1, "N", 1)
+        2.0, Range("Grip", "Largest force with which each finger grips.", 0.1, 50.0, 0.5, 1, "N", 1)
     )
     operator_reach_x: float = _reach("x")
     operator_reach_y: float = _reach("y")
@@ -72,6 +72,27 @@ class OperationSettings:
         ),
     )
     robot_at: str = setting("127.0.0.1:9876", Text("Robot at", "HOST:PORT of the robot."))
+    operator_tones: bool = setting(
+        False,
+        Switch(
+            "Tones",
+            "A tone for each finger, from the left to the right: its pitch and loudness follow the "
+            "force. Silent without a contact, and where data are old or lost.",
+        ),
+    )
+    felt_at_most: float = setting(
+        1.0,
+        Range(
+            "Strongest at",
+            "Force of a finger at which tones and rumble are strongest.",
+            0.05,
+            50.0,
+            0.1,
+            1,
+            "N",
+            2,
+        ),
+    )
 
     @property
     def operator_reach(self) -> tuple[float, float, float]:

@@ -88,10 +88,10 @@ def test_the_slider_sets_the_grip(operator, until) -> None:
     panel = operator.operator
     panel.enable.click()
     panel.grip.setValue(50)
-    until(lambda: operator.control.status.target.grip == pytest.approx(1.5))
+    until(lambda: operator.control.status.target.grip == pytest.approx(1.0))
     until(lambda: operator.control.status.state == "released")
-    operator.requests.set("operator_grip", 1.0)
-    until(lambda: operator.control.status.target.grip == 1.0)
+    operator.requests.set("operator_grip", 0.5)
+    until(lambda: operator.control.status.target.grip == 0.5)
 
 
 def test_a_glove_moves_it_by_udp_to_the_robot(operator, until) -> None:
