@@ -95,7 +95,7 @@ def imports(tree: ast.Module) -> list[tuple[str, str]]:
 
 # There is no window yet; and a player of sound is a device that is fed, not something computed.
 _BESIDE = ("kappaskin_app.shell.background", "kappaskin_app.launch")
-_DEVICES = ("kappaskin_app.features.presenter.sound",)
+_DEVICES = ("kappaskin_app.shell.sound",)
 _WAYS = {
     *("Thread", "Timer", "ThreadPoolExecutor", "ProcessPoolExecutor", "Process", "Popen"),
     *("QThread", "QThreadPool", "QRunnable", "QProcess", "BackgroundProcess"),

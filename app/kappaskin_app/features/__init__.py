@@ -25,6 +25,7 @@ from kappaskin_app.features.heatmaps import HeatmapsFeature
 from kappaskin_app.features.lessons import LessonsFeature
 from kappaskin_app.features.log import LogFeature
 from kappaskin_app.features.membrane import MembraneFeature
+from kappaskin_app.features.operator import OperatorFeature
 from kappaskin_app.features.presenter import PresenterFeature
 from kappaskin_app.features.publish import PublishFeature
 from kappaskin_app.features.recording import RecordingFeature
@@ -53,6 +54,7 @@ FEATURES: tuple[Callable[[], Feature], ...] = (
     HealthFeature,
     ContactFeature,
     HandFeature,
+    OperatorFeature,
     LogFeature,
     CompareFeature,
     DesignFeature,

@@ -23,6 +23,14 @@ from kappaskin.hand.held_object import HeldObject as HeldObject
 from kappaskin.hand.held_object import ObjectFit as ObjectFit
 from kappaskin.hand.held_object import find_held_object as find_held_object
 from kappaskin.hand.held_object import fit_object as fit_object
+from kappaskin.hand.operation import HandTarget as HandTarget
+from kappaskin.hand.operation import OperatorLimits as OperatorLimits
+from kappaskin.hand.operation import TargetFilter as TargetFilter
+from kappaskin.hand.operation import TargetMessage as TargetMessage
+from kappaskin.hand.operation import TargetReceiver as TargetReceiver
+from kappaskin.hand.operator_link import OperatorLink as OperatorLink
+from kappaskin.hand.operator_link import OperatorSettings as OperatorSettings
+from kappaskin.hand.operator_link import OperatorStatus as OperatorStatus
 from kappaskin.hand.placement import Placement as Placement
 from kappaskin.hand.placement import placement as placement
 from kappaskin.hand.simulated_hand import FingerPress as FingerPress

@@ -7,6 +7,7 @@ import pytest
 from kappaskin_app.features.compare.panel import OtherForm
 from kappaskin_app.features.design.panel import DesignForm
 from kappaskin_app.features.guide.panel import page_called
+from kappaskin_app.features.operator.panel import OperatorForm
 from kappaskin_app.shell.form import Form
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.requests import Requests
@@ -16,7 +17,7 @@ from kappaskin_app.theme import THEMES, apply_look
 
 
 def test_every_panel_and_every_dock_says_what_it_is_for(panels) -> None:
-    told = [panel.purpose for panel in (*panels.all(), OtherForm(), DesignForm())]
+    told = [panel.purpose for panel in (*panels.all(), OtherForm(), DesignForm(), OperatorForm())]
     told += [dock.toolTip() for dock in panels.window.docks.by_name().values()]
     assert len(told) > 30
     assert all(len(text) > 40 for text in told)

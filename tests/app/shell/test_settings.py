@@ -7,6 +7,7 @@ from kappaskin import Status
 from kappaskin.bases import EDGES
 from kappaskin_app.features.compare.panel import OtherForm
 from kappaskin_app.features.design.panel import DesignForm
+from kappaskin_app.features.operator.panel import OperatorForm
 from kappaskin_app.shell.settings import SceneSettings, Settings, form_field, part
 from kappaskin_app.shell.settings.form_fields import Choice, Range
 from kappaskin_app.shell.settings.scene import SHAPES
@@ -15,8 +16,8 @@ ASKED = [f.name for f in fields(Settings) if "form" in f.metadata]
 
 
 def test_every_setting_asked_for_stands_in_one_panel(panels) -> None:
-    # Those of what is compared with and of what is designed stand beside their views.
-    forms = [*panels.all(), OtherForm(), DesignForm()]
+    # Those of what is compared with, of what is designed and of the operator stand elsewhere.
+    forms = [*panels.all(), OtherForm(), DesignForm(), OperatorForm()]
     shown = [name for form in forms for name in ASKED if form.findChild(object, name)]
     assert sorted(shown) == sorted(ASKED)
 

@@ -14,7 +14,6 @@ from kappaskin.frames import Estimate
 from kappaskin.live import Status
 from kappaskin_app.features.presenter.feedback import Feedback, Recognised, feedback_of
 from kappaskin_app.features.presenter.indicators import REMEDIES, age_in_words
-from kappaskin_app.features.presenter.sound import Sound
 from kappaskin_app.features.presenter.view import DEMO_OBJECTS, Hand, PresenterView
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.badge import GAP, PAUSED, SIM, origin
@@ -23,6 +22,7 @@ from kappaskin_app.shell.docks import drawn_once
 from kappaskin_app.shell.loads import loads_at, object_replaceable
 from kappaskin_app.shell.selection import LoadHandle
 from kappaskin_app.shell.session import Session
+from kappaskin_app.shell.sound import Sound
 
 TIP = "Estimates in full screen, legible from three metres; Esc ends"
 SOUND_TIP = "A tone whose pitch and loudness follow the force, while the presenter is shown"
@@ -113,7 +113,7 @@ class PresenterController(QObject):
             rest = [part for part in before.shown if not isinstance(part, QDockWidget)]
             before = replace(before, arrange=arrange, shown=rest)
         self._before = None
-        self.sound.set_level(math.nan)
+        self.sound.set_levels()
         with drawn_once(window):
             self.view.present(False)
             window.setWindowState(before.state)
@@ -170,7 +170,7 @@ class PresenterController(QObject):
         recognised = self._recognised if now - self._recognised_at < _OLD else None
         self.feedback = None if estimate is None else feedback_of(estimate, recognised)
         self.view.show_graphics(self.feedback, now)
-        self.sound.set_level(self.view.bar.share)
+        self.sound.set_levels(self.view.bar.share)
 
     def show_numbers(self, estimate: Estimate | None) -> None:
         """Write the estimate whose numbers are shown elsewhere, too."""

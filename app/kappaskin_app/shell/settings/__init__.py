@@ -14,6 +14,7 @@ from kappaskin_app.shell.settings.form_fields import Range as Range
 from kappaskin_app.shell.settings.form_fields import Several as Several
 from kappaskin_app.shell.settings.form_fields import Switch as Switch
 from kappaskin_app.shell.settings.form_fields import Text as Text
+from kappaskin_app.shell.settings.operation import OperationSettings as OperationSettings
 from kappaskin_app.shell.settings.publishing import PublishSettings as PublishSettings
 from kappaskin_app.shell.settings.scene import FREE_CASES as FREE_CASES
 from kappaskin_app.shell.settings.scene import LOAD_CASES as LOAD_CASES
@@ -54,6 +55,7 @@ class Settings(
     PublishSettings,
     ComparedSettings,
     DesignSettings,
+    OperationSettings,
 ):
     """All settings, in SI units; a change is a new `Settings`.
 
@@ -72,6 +74,7 @@ _PANELS = {
     Scanning: "scan",
     PublishSettings: "publish",
     ComparedSettings: "B",
+    OperationSettings: "operation",
 }
 """Panels whose name precedes the label of their settings in the history."""
 _LONGEST = 30  # characters of a text

@@ -1,0 +1,170 @@
+"""Operator control: from an input device to the operator's process and the simulated hand."""
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Protocol
+
+from PySide6.QtCore import QObject, Qt, QTimer, Signal
+
+from kappaskin.errors import Refusal
+from kappaskin.hand import (
+    HandTarget,
+    OperatorLimits,
+    OperatorLink,
+    OperatorSettings,
+    OperatorStatus,
+    TargetFilter,
+)
+from kappaskin_app.guard import guarded
+from kappaskin_app.shell.history import History
+from kappaskin_app.shell.settings import Settings
+from kappaskin_app.shell.settings.operation import UDP
+
+_EVERY = 8  # ms between two targets
+_SHOWN = 5  # of them between two reports
+_GRIPS = 0.5  # s for which a grip that is set is followed
+
+
+class InputDevice(Protocol):
+    """What moves the hand; `trouble` says why it does not."""
+
+    @property
+    def trouble(self) -> str: ...
+
+    def wanted(
+        self, target: HandTarget, limits: OperatorLimits, seconds: float
+    ) -> HandTarget | None:
+        """Where it wants the hand after `seconds`, from `target`; None to hold still."""
+        ...
+
+
+def limits_of(settings: Settings) -> OperatorLimits:
+    """The limits that the settings have."""
+    return OperatorLimits(
+        settings.operator_speed,
+        settings.operator_turn_rate,
+        settings.operator_grip,
+        settings.operator_reach,
+    )
+
+
+class OperatorControl(QObject):
+    """Follows the input while it is `enabled`; off at first.
+
+    `reported` brings the status, about 25 times a second; `switched` whether it is enabled;
+    `refused` why the process does not run, `ended` that it has ended. `followers` get each target
+    that is followed.
+    """
+
+    reported = Signal(OperatorStatus)
+    switched = Signal(bool)
+    refused = Signal(str)
+    ended = Signal()
+
+    def __init__(self, history: History, devices: Mapping[str, InputDevice]) -> None:
+        super().__init__()
+        self._history, self._devices = history, devices
+        self.followers: list[Callable[[HandTarget], object]] = []
+        self.enabled = self._visible = False
+        self.status = OperatorStatus(HandTarget())
+        self._filter = TargetFilter(limits_of(history.settings), HandTarget())
+        self.link: OperatorLink | None = None
+        self._grip, self._grip_until = 0.0, 0.0
+        self._input, self._ticks = history.settings.operator_input, 0
+        self._timer = QTimer(self, interval=_EVERY, timerType=Qt.TimerType.PreciseTimer)  # pyright: ignore[reportCallIssue]
+        self._timer.timeout.connect(guarded(self._tick))
+
+    def set_visible(self, visible: bool) -> None:
+        """Have the operator's process while its state is visible, or the input moves the hand."""
+        self._visible = visible
+        if visible:
+            self._begin()
+        elif not self.enabled:
+            self.close()
+
+    def _begin(self) -> None:
+        try:
+            self.link = self.link or OperatorLink(self.status.target)
+            self._timer.start()
+        except Refusal as refusal:
+            self.refused.emit(str(refusal))
+
+    def switch(self, on: bool) -> None:
+        """Let the input move the hand, or not."""
+        if on:
+            self._begin()
+        if (on := on and self.link is not None) != self.enabled:
+            self.enabled = on
+            self.switched.emit(on)
+            self.set_visible(self._visible)
+
+    def set_grip(self, share: float) -> None:
+        """Grip with a `share` of the largest force."""
+        self._grip = share * self._filter.limits.grip
+        self._grip_until = time.monotonic() + _GRIPS
+
+    def _tick(self) -> None:
+        settings = self._history.settings
+        if settings.operator_input != self._input:
+            self._input = settings.operator_input
+            self.switch(False)
+        try:
+            self._request(settings, limits_of(settings))
+        except Refusal as refusal:
+            self.close()
+            self.refused.emit(str(refusal))
+            return
+        self._ticks += 1
+        if self._ticks % _SHOWN == 0:
+            self.reported.emit(self.status)
+
+    def _request(self, settings: Settings, limits: OperatorLimits) -> None:
+        """Request that the input is followed, and take the status."""
+        if self.link is None:
+            return
+        by_udp, now = self._input == UDP, time.monotonic()
+        self._filter.limits = limits
+        wanted = None if by_udp or not self.enabled else self._wanted(limits, now)
+        if wanted is None:
+            self._filter.target = replace(self.status.target, time=now)
+        request = OperatorSettings(
+            limits,
+            self.enabled,
+            settings.operator_listens if by_udp else "",
+            settings.robot_at if settings.send_to_robot else "",
+        )
+        was = self.status.target
+        self.status = self.link.request(request, wanted and self._filter.follow(wanted, now))
+        target = self.status.target
+        if (target.position, target.rotation, target.grip) != (
+            was.position,
+            was.rotation,
+            was.grip,
+        ):
+            for follow in self.followers:
+                follow(target)
+
+    def _wanted(self, limits: OperatorLimits, now: float) -> HandTarget | None:
+        """What the device wants, with the grip that is set."""
+        at = self._filter.target
+        wanted = self._devices[self._input].wanted(at, limits, now - at.time)
+        if now < self._grip_until:
+            wanted = replace(wanted or at, grip=self._grip)
+        return wanted
+
+    @property
+    def trouble(self) -> str:
+        """Why the input does not move the hand, or the robot is not reached; empty if neither."""
+        device = self._devices.get(self._input)
+        return (device.trouble if device else "") or self.status.trouble
+
+    def close(self) -> None:
+        """Hold still, and end the process, until it is shown or enabled again."""
+        self._visible = False
+        self._timer.stop()
+        if self.link is not None:
+            link, self.link = self.link, None
+            link.close()
+            self.ended.emit()
+        self.switch(False)
