@@ -16,6 +16,7 @@ from kappaskin.calibration import Calibration, Tare
 from kappaskin.errors import Refusal
 from kappaskin.estimation import Region, ScanTradeoff
 from kappaskin.frames import Estimate
+from kappaskin.hand import HandDescription
 from kappaskin.live import STREAMING, Engine, Fingers, ResumeInfo, Status
 from kappaskin.mechanics import Plate, PointLoad
 from kappaskin.pipeline import Setup
@@ -202,6 +203,8 @@ class Session(QObject):
         self.fingers = engine if isinstance(engine, Fingers) else None
         engines = {"": engine} if isinstance(engine, Engine) else engine.engines
         self.finger, engine = next(iter(engines.items()))
+        self.hand: HandDescription | None = None
+        """Where the fingers are, if that is known."""
         self._others = dict[str, tuple[str, Settings]]()
         """Source and settings of each finger that is not shown."""
         self._history = history
@@ -336,8 +339,11 @@ class Session(QObject):
         self._history.change(f"Play {written.file.stem}", -1, written=written)
         self._play()
 
-    def begin_fingers(self, sources: Mapping[str, str]) -> None:
-        """Begin with the `sources` of a hand, which its engines read already."""
+    def begin_fingers(
+        self, sources: Mapping[str, str], hand: HandDescription | None = None
+    ) -> None:
+        """Begin with the `sources` of a hand, which its engines read already, and what it is."""
+        self.hand = hand
         self._others = {
             finger: (source, settings_for(source, self._trusts(source)))
             for finger, source in sources.items()

@@ -7,7 +7,9 @@ from kappaskin.hand.description import HandDescription as HandDescription
 from kappaskin.hand.description import Linkage as Linkage
 from kappaskin.hand.description import Placement as Placement
 from kappaskin.hand.description import angles_from_json as angles_from_json
+from kappaskin.hand.description import is_hand as is_hand
 from kappaskin.hand.description import load_hand as load_hand
+from kappaskin.hand.description import named_hand as named_hand
 from kappaskin.hand.description import placement as placement
 from kappaskin.hand.exploration import ContactMotion as ContactMotion
 from kappaskin.hand.exploration import ObjectMap as ObjectMap

@@ -1,8 +1,10 @@
 """A hand: the sensors of its fingers, and where each skin is in the hand's frame."""
 
 import math
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from importlib.resources import files
 from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
@@ -20,6 +22,8 @@ from kappaskin.sources import is_finger
 FORMAT = 1
 _LARGEST = 2**22  # bytes of a hand's file or of a URDF
 _MOST_FINGERS = 64
+_SCHEME, _ENDING = "hand:", ".toml"
+_FOLDER = Path(str(files("kappaskin_resources"))) / "hands"
 _FIXED, _TURNS, _SLIDES = ("fixed",), ("revolute", "continuous"), ("prismatic",)
 
 Triple = tuple[float, float, float]
@@ -256,6 +260,11 @@ class HandDescription:
                 )
 
     @property
+    def sources(self) -> dict[str, str]:
+        """The source of each finger by its name."""
+        return {finger.name: finger.source for finger in self.fingers}
+
+    @property
     def joints(self) -> dict[str, tuple[float, float]]:
         """The limits in rad or m of each joint whose value `placements` needs."""
         return {} if self.linkage is None else self.linkage.joints
@@ -342,6 +351,31 @@ def load_hand(file: Path, trust: Trust = False) -> HandDescription:
     top.done()
     with top.blamed():
         return HandDescription(title, tuple(fingers), linkage)
+
+
+def is_hand(file: Path) -> bool:
+    """Whether a TOML file describes a hand: it has a table [[finger]]."""
+    try:
+        return "finger" in tomllib.loads(read_file(file, _LARGEST).decode("utf-8-sig"))
+    except (OSError, ValueError, RecursionError):
+        return False
+
+
+def named_hand(source: str, trust: Trust = False) -> HandDescription | None:
+    """The hand that a `source` names: `hand:NAME` is a ready one, FILE.toml one of your own.
+
+    None for any other source, as for `hand:NAME#FINGER`, which is that of one finger.
+    """
+    name = source.removeprefix(_SCHEME)
+    if name == source:
+        mine = source.endswith(_ENDING) and is_hand(Path(source))
+        return load_hand(Path(source), trust) if mine else None
+    if "#" in name:
+        return None
+    ready = sorted(file.stem for file in _FOLDER.iterdir() if file.suffix == _ENDING)
+    if name not in ready:
+        raise Refusal(f"expected a hand among {', '.join(ready)}, or a file; got {name!r:.60}")
+    return load_hand(_FOLDER / f"{name}{_ENDING}", trust)
 
 
 def _text(file: Path, what: str) -> str:

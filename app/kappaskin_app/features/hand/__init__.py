@@ -1,6 +1,7 @@
 """Hand: a small map of each finger; a click shows the finger in the window."""
 
 import time
+from pathlib import Path
 
 import numpy as np
 from PySide6.QtCore import Qt, QTimer, Signal
@@ -8,11 +9,14 @@ from PySide6.QtGui import QMouseEvent
 from PySide6.QtWidgets import QButtonGroup, QHBoxLayout, QRadioButton, QVBoxLayout, QWidget
 
 from kappaskin._text import with_error
+from kappaskin.errors import Refusal
 from kappaskin.frames import Estimate
+from kappaskin.hand import is_hand
 from kappaskin.live import Status
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.badge import LIVE, SIM, origin, state_of
 from kappaskin_app.shell.colouring import SteadyRange, largest
+from kappaskin_app.shell.opening import Kind
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.window import MainWindow
 from kappaskin_app.widgets.surface_map import SurfaceMap
@@ -99,11 +103,18 @@ class HandPanel(QWidget):
             self.views[finger].show_finger(status, estimate)
 
 
+def _begin_with(file: Path) -> None:
+    raise Refusal(
+        f"{file.name} describes a hand, which a window begins with: `kappaskin app {file.name}`"
+    )
+
+
 class HandFeature:
     name = "hand"
 
     def install(self, shell: MainWindow) -> None:
         session = shell.session
+        shell.opening.add(Kind("hand", (".toml",), _begin_with, is_hand))
         if session.fingers is None:
             return
         self.panel = panel = HandPanel(session)
