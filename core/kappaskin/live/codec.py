@@ -78,7 +78,7 @@ def _plain(value: Any, parts: list[bytes]) -> Any:
             parts.append(value)
             return [len(value), _begin(parts)]
         case np.generic():
-            return value.item()
+            return cast("Any", value).item()
         case np.dtype():
             return _format.dtype_to_descr(value)
         case PurePath():
