@@ -203,6 +203,9 @@ class _Relay:
             self._changes.clear()
             shown = [name for name in self._requested.changed if name not in (*_OWN, *_KEPT)]
             self._change(shown)
+            self._connections += self._status.connections
+            self._generation = _Generation(self._generation.ours)
+            self._compared = _Generation(self._compared.ours)
         self._line, self._break = line, _BREAK
         with suppress(OSError):  # that it is lost again is seen when it is read
             for change in self._changes:
@@ -281,8 +284,6 @@ class _Relay:
             self._known = self._numbers.pop(0)[1]
         self._changes = [each for each in self._changes if each.number > report.received]
         status = Status(**{each.name: self._fields[each.name] for each in fields(Status)})
-        if status.connections < self._status.connections:  # it was started again
-            self._connections += self._status.connections
         fresh = status.event_count - self._taken
         fresh = fresh if 0 <= fresh < len(status.events) else len(status.events)
         self._taken, offset = status.event_count, self._clock.offset
