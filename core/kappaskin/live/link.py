@@ -241,8 +241,7 @@ class EngineAddress:
     @property
     def place(self) -> str:
         """The host and the port as text."""
-        host = f"[{self.host}]" if ":" in self.host else self.host
-        return f"{host}:{self.port}"
+        return place_text(self.host, self.port)
 
     def connect(self, finger: str | None, within: float) -> tuple[MessageSocket, Welcome]:
         """A connection, and what the engine has: a `SourceError` where there is none.
@@ -303,6 +302,12 @@ def check_version(version: str, whose: str) -> None:
             f"expected the same version at both ends, got {printable(version[:20])} of {whose} and "
             f"{VERSION} here; install the same one"
         )
+
+
+def place_text(host: str, port: int) -> str:
+    """HOST, or HOST:PORT where it is not the usual one, as `place_of` reads it."""
+    host = f"[{host}]" if ":" in host else host
+    return host if port == PORT else f"{host}:{port}"
 
 
 def place_of(text: str) -> tuple[str, int]:

@@ -17,6 +17,7 @@ from kappaskin.errors import Refusal
 from kappaskin.live.codec import BadMessageError, decoded, encoded
 from kappaskin.live.engine import Engine, Fingers
 from kappaskin.live.link import (
+    SCHEME,
     VERSION,
     Answer,
     Change,
@@ -31,6 +32,7 @@ from kappaskin.live.link import (
     Shown,
     Welcome,
     check_version,
+    place_text,
     proof_of,
 )
 from kappaskin.live.records import packed
@@ -201,7 +203,7 @@ class EngineServer:
         recordings: Path,
         trust: bool = False,
     ) -> None:
-        self._hand, self._token, self._folder = hand, token, recordings
+        self._hand, self._token, self._folder, self._host = hand, token, recordings, host
         self._fingers = {
             name: _Finger(engine, sources[name], trust) for name, engine in hand.engines.items()
         }
@@ -213,12 +215,20 @@ class EngineServer:
         try:
             self._listener = socket.create_server((host, port), family=family)
         except OSError as error:
+            why = (error.strerror or str(error)).partition(" (while")[0]
             raise Refusal(
-                f"expected to listen at {host}, port {port}, got {error.strerror or error}; choose "
-                "another port"
+                f"expected to listen at {host}, port {port}, got {why}; choose another port"
             ) from error
         self._listener.setblocking(False)
         self.port = int(self._listener.getsockname()[1])
+
+    @property
+    def invitation(self) -> str:
+        """The source that a window connects to."""
+        everywhere = self._host in ("0.0.0.0", "::")
+        return (
+            f"{SCHEME}{place_text(socket.gethostname() if everywhere else self._host, self.port)}"
+        )
 
     def poll(self, wait: float) -> None:
         """Serve for some `wait` s."""

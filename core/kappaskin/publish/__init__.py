@@ -1,8 +1,10 @@
 """Estimates to other programs: UDP, Foxglove."""
 
 from kappaskin.publish.access import THIS_MACHINE as THIS_MACHINE
+from kappaskin.publish.access import TOKEN as TOKEN
 from kappaskin.publish.access import Access as Access
 from kappaskin.publish.access import access_of as access_of
+from kappaskin.publish.access import token_of as token_of
 from kappaskin.publish.message import SourceState as SourceState
 from kappaskin.publish.publishing import Latency as Latency
 from kappaskin.publish.publishing import Publishing as Publishing
