@@ -164,3 +164,24 @@ def test_without_a_description_the_window_says_what_to_open(hand, until):
     until(lambda: "kappaskin app hand.toml" in panel.texts["Held"].text())
     assert not panel.hand_view.isVisible()
     assert not panel.texts["Sum of forces"].isVisible()
+
+
+def test_the_strip_chart_has_a_curve_of_each_finger_that_goes_on_when_another_is_shown(hand, until):
+    hand.actions_by_name["dock-strip_chart"].trigger()
+    panel = hand.features["strip_chart"].strips.panel
+
+    def curves():
+        return {each.name: each.x for each in panel.charts["force"].series if each.name}
+
+    until(lambda: set(curves()) == set(SOURCES))
+    until(lambda: all(len(x) > 20 for x in curves().values()))
+    ends = [x[-1] for x in curves().values()]
+    assert max(ends) - min(ends) < 1.0
+
+    kept = {name: len(x) for name, x in curves().items()}
+    choose(hand, "index")
+    until(lambda: hand.session.estimate is not None)
+    until(lambda: all(len(x) >= kept[name] for name, x in curves().items()))
+
+    panel.all_fingers.click()
+    assert curves() == {}
