@@ -398,7 +398,7 @@ class Session(QObject):
         Of one that plays a recording when it is shown: until then all is as it was recorded.
         """
         for finger, settings in self._history.others.items():
-            source, engine = self._sources[finger], self._engine_of(finger)
+            source, engine = self._sources[finger], self.engine_of(finger)
             if source.startswith(RECORDED):
                 continue
             inside = source.startswith("sim:")
@@ -420,10 +420,10 @@ class Session(QObject):
             if not self._preparation_of_others.ready(settings := self._history.others[finger]):
                 return
             with suppress(Refusal):  # which is told once it is shown
-                self._engine_of(finger).play(planned_scene(scene_of(settings)))
+                self.engine_of(finger).play(planned_scene(scene_of(settings)))
             self._unplayed.discard(finger)
 
-    def _engine_of(self, finger: str) -> Engine:
+    def engine_of(self, finger: str) -> Engine:
         return self.fingers.engines[finger] if self.fingers else self.engine
 
     def set_calibrating(self, calibrating: bool) -> None:
@@ -463,7 +463,7 @@ class Session(QObject):
 
     def _publish_to(self, settings: Settings, finger: str) -> str:
         """Publish a finger to the targets of its settings, or to none; why there are none."""
-        engine, number = self._engine_of(finger), 0
+        engine, number = self.engine_of(finger), 0
         if self.fingers is not None:
             number = list(self.fingers.engines).index(finger)
         try:
@@ -564,7 +564,7 @@ class Session(QObject):
         if reports := now >= self._next_status:
             self._next_status = now + _STATUS
             (self.fingers or self.engine).revive()
-            self.status = self._of_hand(self.engine.status())
+            self.status = self.status_of(self.finger)
             self._lost_since = min(self._lost_since, now) if self._lost else math.inf
             if self.status.connections != connections:
                 self.estimate = None  # the estimate was of the last sensor
@@ -588,11 +588,15 @@ class Session(QObject):
         if self.timer.isActive():
             self.timer.start(_DRAWN if shown else _TICK)
 
-    def _of_hand(self, status: Status) -> Status:
-        """The status with a number of connections that no other finger has, and the hand's file."""
+    def status_of(self, finger: str) -> Status:
+        """The status of a finger, with the hand's file.
+
+        Its number of connections is one that no other finger has.
+        """
+        status = self.engine_of(finger).status()
         if self.fingers is None:
             return status
-        first = _FINGERS * list(self.fingers.engines).index(self.finger)
+        first = _FINGERS * list(self.fingers.engines).index(finger)
         recording = self.fingers.recording
         return replace(status, connections=first + status.connections, recording=recording)
 

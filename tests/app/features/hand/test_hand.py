@@ -3,14 +3,25 @@
 import os
 import signal
 
+import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
+from kappaskin.hand import Finger, HandDescription
 from kappaskin.live import Fingers
 from kappaskin.recording import Recording
 
 SOURCES = {"thumb": "sim:", "index": "sim:fingertip-cap"}
+
+
+HAND = HandDescription(
+    "Two",
+    (
+        Finger("thumb", SOURCES["thumb"], (-0.12, 0.0, 0.0), (0.0, 0.3, 0.0)),
+        Finger("index", SOURCES["index"], (0.04, 0.0, 0.0), (0.0, -0.3, 0.0)),
+    ),
+)
 
 
 @pytest.fixture
@@ -18,7 +29,7 @@ def hand(opened, until):
     fingers = Fingers(SOURCES)
     fingers.connect(SOURCES)
     window = opened("sim:", fingers)
-    window.session.begin_fingers(SOURCES)
+    window.session.begin_fingers(SOURCES, HAND)
     until(lambda: all(" N" in text for text in words(window)))
     return window
 
@@ -28,7 +39,8 @@ def hand_of(window):
 
 
 def words(window):
-    return [view.map.words.text() for view in hand_of(window).values()]
+    views = hand_of(window).values()
+    return [f"{view.map.words.text()}: {view.force.text()}" for view in views]
 
 
 def choose(window, finger):
@@ -126,3 +138,50 @@ def test_noise_of_all_fingers_is_simulated_by_each(opened, until):
             for engine in fingers.engines.values()
         )
     )
+
+
+def test_the_hand_is_drawn_and_a_click_on_a_finger_shows_it(hand, until):
+    view = hand.features["hand"].panel.hand_view
+    until(lambda: set(view.fingers) == set(SOURCES))
+    index = view.fingers["index"]
+    middle = (index.where @ [*index.skin.at_rest(np.array([[0.0105, 0.0105]]))[0][0], 1.0])[:3]
+    at = view.place_of(middle)
+    assert view.finger_at(at) == "index"
+    QTest.mouseClick(view, Qt.MouseButton.LeftButton, pos=at.toPoint())
+    assert hand.session.finger == "index"
+
+
+def test_what_is_held_is_told_with_the_sum_of_forces(hand, until):
+    texts = hand.features["hand"].panel.texts
+    until(lambda: texts["Sum of forces"].text().endswith(" N"))
+    assert texts["Held"].text().startswith("Held: ")
+    assert texts["Sum of moments"].text().endswith(" N mm")
+
+
+def test_without_a_description_the_window_says_what_to_open(hand, until):
+    panel = hand.features["hand"].panel
+    hand.session.hand = None
+    until(lambda: "kappaskin app hand.toml" in panel.texts["Held"].text())
+    assert not panel.hand_view.isVisible()
+    assert not panel.texts["Sum of forces"].isVisible()
+
+
+def test_the_strip_chart_has_a_curve_of_each_finger_that_goes_on_when_another_is_shown(hand, until):
+    hand.actions_by_name["dock-strip_chart"].trigger()
+    panel = hand.features["strip_chart"].strips.panel
+
+    def curves():
+        return {each.name: each.x for each in panel.charts["force"].series if each.name}
+
+    until(lambda: set(curves()) == set(SOURCES))
+    until(lambda: all(len(x) > 20 for x in curves().values()))
+    ends = [x[-1] for x in curves().values()]
+    assert max(ends) - min(ends) < 1.0
+
+    kept = {name: len(x) for name, x in curves().items()}
+    choose(hand, "index")
+    until(lambda: hand.session.estimate is not None)
+    until(lambda: all(len(x) >= kept[name] for name, x in curves().items()))
+
+    panel.all_fingers.click()
+    assert curves() == {}
