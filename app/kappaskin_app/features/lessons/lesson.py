@@ -97,7 +97,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Lesson:
-    """A lesson of about so many `minutes`, in steps; on the ready hand `hand` where one is named."""
+    """A lesson of about so many `minutes`, in steps; on a ready `hand` where one is named."""
 
     name: str
     title: str
