@@ -70,7 +70,7 @@ class CueSender:
         self._worst = 1.0, ""
         self._closed = False
         # No daemon: a process that ends lets the cue fade. The thread ends with the main one.
-        threading.Thread(target=self._run, name="cue-sender").start()
+        threading.Thread(target=self._run, name="cue-sender", daemon=False).start()
 
     @property
     def receivers(self) -> tuple[Receiver, ...]:
