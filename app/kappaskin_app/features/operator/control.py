@@ -1,9 +1,8 @@
-"""Operator control: from an input device to the operator's process and the simulated hand."""
+"""Operator control: from the pad and the settings to the operator's process."""
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
-from typing import Protocol
 
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
 
@@ -16,27 +15,15 @@ from kappaskin.hand import (
     OperatorStatus,
     TargetFilter,
 )
+from kappaskin_app.features.operator.pad import Pad
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.settings import Settings
-from kappaskin_app.shell.settings.operation import UDP
+from kappaskin_app.shell.settings.operation import GAMEPAD, PAD, UDP
 
 _EVERY = 8  # ms between two targets
 _SHOWN = 5  # of them between two reports
 _GRIPS = 0.5  # s for which a grip that is set is followed
-
-
-class InputDevice(Protocol):
-    """What moves the hand; `trouble` says why it does not."""
-
-    @property
-    def trouble(self) -> str: ...
-
-    def wanted(
-        self, target: HandTarget, limits: OperatorLimits, seconds: float
-    ) -> HandTarget | None:
-        """Where it wants the hand after `seconds`, from `target`; None to hold still."""
-        ...
 
 
 def limits_of(settings: Settings) -> OperatorLimits:
@@ -62,15 +49,17 @@ class OperatorControl(QObject):
     refused = Signal(str)
     ended = Signal()
 
-    def __init__(self, history: History, devices: Mapping[str, InputDevice]) -> None:
+    def __init__(self, history: History, pad: Pad) -> None:
         super().__init__()
-        self._history, self._devices = history, devices
+        self._history, self._pad = history, pad
         self.followers: list[Callable[[HandTarget], object]] = []
         self.enabled = self._visible = False
         self.status = OperatorStatus(HandTarget())
         self._filter = TargetFilter(limits_of(history.settings), HandTarget())
         self.link: OperatorLink | None = None
         self._grip, self._grip_until = 0.0, 0.0
+        self.rumble = 0.0
+        """How strongly a gamepad rumbles, as a share of the strongest."""
         self._input, self._ticks = history.settings.operator_input, 0
         self._timer = QTimer(self, interval=_EVERY, timerType=Qt.TimerType.PreciseTimer)  # pyright: ignore[reportCallIssue]
         self._timer.timeout.connect(guarded(self._tick))
@@ -123,16 +112,19 @@ class OperatorControl(QObject):
         """Request that the input is followed, and take the status."""
         if self.link is None:
             return
-        by_udp, now = self._input == UDP, time.monotonic()
+        now = time.monotonic()
         self._filter.limits = limits
-        wanted = None if by_udp or not self.enabled else self._wanted(limits, now)
+        pad = self.enabled and self._input == PAD
+        wanted = self._wanted(limits, now) if pad else None
         if wanted is None:
             self._filter.target = replace(self.status.target, time=now)
         request = OperatorSettings(
             limits,
             self.enabled,
-            settings.operator_listens if by_udp else "",
+            settings.operator_listens if self._input == UDP else "",
+            self._input == GAMEPAD,
             settings.robot_at if settings.send_to_robot else "",
+            self.rumble,
         )
         was = self.status.target
         self.status = self.link.request(request, wanted and self._filter.follow(wanted, now))
@@ -146,18 +138,12 @@ class OperatorControl(QObject):
                 follow(target)
 
     def _wanted(self, limits: OperatorLimits, now: float) -> HandTarget | None:
-        """What the device wants, with the grip that is set."""
+        """What the pad wants, with the grip that is set."""
         at = self._filter.target
-        wanted = self._devices[self._input].wanted(at, limits, now - at.time)
+        wanted = self._pad.wanted(at, limits, now - at.time)
         if now < self._grip_until:
             wanted = replace(wanted or at, grip=self._grip)
         return wanted
-
-    @property
-    def trouble(self) -> str:
-        """Why the input does not move the hand, or the robot is not reached; empty if neither."""
-        device = self._devices.get(self._input)
-        return (device.trouble if device else "") or self.status.trouble
 
     def close(self) -> None:
         """Hold still, and end the process, until it is shown or enabled again."""

@@ -55,7 +55,6 @@ class Pad(QWidget):
     """
 
     stopped = Signal()
-    trouble = ""
 
     def __init__(self) -> None:
         super().__init__()

@@ -80,6 +80,10 @@ class OperationSettings:
             "force. Silent without a contact, and where data are old or lost.",
         ),
     )
+    operator_rumble: bool = setting(
+        True,
+        Switch("Rumble", "The gamepad rumbles as strongly as the finger that feels most."),
+    )
     felt_at_most: float = setting(
         1.0,
         Range(

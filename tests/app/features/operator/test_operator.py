@@ -140,3 +140,18 @@ def test_a_process_that_dies_is_reported_and_started_again(operator, until) -> N
     panel.enable.click()
     assert panel.enable.isChecked()
     until(lambda: operator.control.status.target.time > before)
+
+
+def test_a_gamepad_that_is_missing_is_reported(operator, until) -> None:
+    operator.requests.set("operator_input", "gamepad")
+    text = operator.operator.message.text
+    until(lambda: "ip install 'kappaskin[gamepad]'" in text() or "plug one in" in text())
+
+
+def test_the_gamepad_rumbles_as_the_finger_that_feels_most(shared_window) -> None:
+    feature = shared_window.features["operator"]
+    feature.feeling.felt.emit([0.2, 0.7, 0.0])
+    assert feature.control.rumble == 0.7
+    shared_window.requests.set("operator_rumble", False)
+    feature.feeling.felt.emit([0.2, 0.7, 0.0])
+    assert feature.control.rumble == 0.0
