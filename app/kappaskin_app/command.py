@@ -5,6 +5,7 @@ import os
 import sys
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from cyclopts import App
 
@@ -20,6 +21,9 @@ from kappaskin.cli import (
 )
 from kappaskin.errors import Refusal, lacking
 from kappaskin_app import DEFAULT_SOURCE
+
+if TYPE_CHECKING:
+    from kappaskin.hand import HandDescription
 
 app = App(name="app", help_format="markdown")
 demo = App(name="demo", help_format="markdown")
@@ -76,10 +80,11 @@ def run(
     Parameters
     ----------
     file
-        A recording or a scene to play, a calibration of the sensor, or a mesh as the object.
+        A recording or a scene to play, a calibration of the sensor, a mesh as the object, or the
+        description of a hand.
     source
         `sim:`, `sim:SCENE`, `replay:FILE`, `feed:NAME`, or a port or URL for pyserial; of a hand
-        NAME=SOURCE for each finger.
+        NAME=SOURCE for each finger, `hand:NAME`, or the file of its description.
     seconds
         Close after this many seconds; the window opens with the default theme and layout.
     screenshot
@@ -87,11 +92,18 @@ def run(
     trust
         Let the scene named here, by FILE or the source, name files outside its folder.
     """
+    from kappaskin.hand import is_hand, named_hand
+
     allow(limit)
     if file is not None and not file.is_file():
         raise Refusal(f"{file}: no such file; check its name")
+    if file is not None and is_hand(file):
+        if source:
+            raise Refusal(f"expected {file}, which describes a hand, or --source; got both")
+        source, file = [str(file)], None
     sources = fingers_of(None if source else DEFAULT_SOURCE, source, sensor)
-    _open(sources, seconds, screenshot, file=file, trust=trust)
+    hand = named_hand(source[0]) if source else None
+    _open(sources, seconds, screenshot, file=file, trust=trust, hand=hand)
 
 
 @demo.default
@@ -122,6 +134,7 @@ def _open(
     presenting: bool = False,
     file: Path | None = None,
     trust: bool = False,
+    hand: "HandDescription | None" = None,
 ) -> None:
     if seconds is not None and not 0 < seconds <= _LONGEST:
         raise Refusal(f"expected seconds above zero, {_LONGEST:g} at most, got {seconds}")
@@ -133,7 +146,7 @@ def _open(
     from kappaskin_app.launch import launch
 
     try:
-        launch(sources, seconds, screenshot, presenting, file, trust)
+        launch(sources, seconds, screenshot, presenting, file, trust, hand)
     except ImportError as error:
         raise lacking("app", "the desktop app", error) from error
 

@@ -25,6 +25,7 @@ from kappaskin.errors import Refusal
 if TYPE_CHECKING:
     from PySide6.QtWidgets import QApplication
 
+    from kappaskin.hand import HandDescription
     from kappaskin.live import Engine, Fingers
     from kappaskin_app.shell.log_files import LogFiles
     from kappaskin_app.shell.recovery import Recovery
@@ -48,10 +49,11 @@ def opened(
     source: str | Mapping[str, str],
     kept: Path | None = None,
     trusted: frozenset[Path] = frozenset(),
+    hand: "HandDescription | None" = None,
 ) -> "tuple[QApplication, MainWindow]":
     """The application and its window, shown, on `source` or on what the last window left.
 
-    Or on the source of each finger of a hand, by their names.
+    Or on the source of each finger of a hand, by their names; `hand` describes it, if known.
 
     The `trusted` scenes, absolute paths, may name files outside their folders.
 
@@ -88,7 +90,7 @@ def opened(
         if splash is not None:
             splash.say("Building the window")
         window = MainWindow(all_features(), first, engine, trusted)
-        window.session.begin_fingers(fingers)
+        window.session.begin_fingers(fingers, hand)
     except BaseException:
         engine.close()
         raise
@@ -179,10 +181,11 @@ def launch(
     presenting: bool = False,
     file: Path | None = None,
     trust: bool = False,
+    hand: "HandDescription | None" = None,
 ) -> None:
     """Show the window on `sources`; after `seconds` save `screenshot`, if any, and close.
 
-    They are those of the fingers of a hand by their names, or one without a name.
+    They are those of the fingers of a `hand` by their names, or one without a name.
 
     While it is `presenting`, what is felt fills the screen. A `file` is opened as one dropped is.
     With `trust` the scene of either may name files outside its folder.
@@ -196,7 +199,7 @@ def launch(
     # What a script opens for some seconds is the same whatever was before.
     scenes = [*map(_scene_of, sources.values()), Path(file or "").absolute()] if trust else []
     window_file = _kept_file() if seconds is None else None
-    application, window = opened(sources.get("", sources), window_file, frozenset(scenes))
+    application, window = opened(sources.get("", sources), window_file, frozenset(scenes), hand)
     recovering = _recovering(window)
     full_screen = window.layouts.full_screen
     if presenting and full_screen is not None and not window.session.engine.resumed:

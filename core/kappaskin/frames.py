@@ -71,8 +71,10 @@ class Contact:
     """A contact: `position` (2,) in m with `position_sd` (2,) in m, and how hard it is.
 
     `force` and `force_sd` in N, `displacement` and `displacement_sd` in m, of the skin at the
-    contact; `spare` readings more than the loads need tell the noise. `single` says whether one
-    load on a small area explains the readings: no line, no large area, no two contacts.
+    contact: of the fitted shape, and on a cap or a mesh, which bend more closely around a load than
+    its functions follow, of a load of this force and size; `spare` readings more than the loads
+    need tell the noise. `single` says whether one load on a small area explains the readings: no
+    line, no large area, no two contacts.
     `near_rim` warns that the contact is too near a held edge, where no force moves the skin, for a
     reliable position and force.
     `size` and `size_sd` in m^2 are the squared radius of the disc that the load is spread over;

@@ -392,6 +392,30 @@ def shapes_on_cap(case, frames, seed=0) -> dict[str, tuple[float, float]]:
     return found
 
 
+def depths_on_cap(case, frames, seed=0) -> tuple[float, float, float]:
+    """Share of the intervals of the depth that hold it, and its mean and rms error as shares.
+
+    Of presses on the cap of `case`, 12 distances from the pole in turn.
+    """
+    rng, layout, cap = np.random.default_rng(seed), case.layout, case.skin.patch
+    read, contact = case.truth(layout), PointContact(case.skin, layout, case.edge)
+    fit = LeastSquares(basis_for(cap, case.edge, 8, 8), layout)
+    far = cap.rim_radius * _even(rng.uniform(0, 1, 12), 0.75 * cap.angle) / cap.angle
+    moved = _revolved(case.skin, case.edge).mover(np.stack([far, np.zeros(12)], -1))
+    any_load, off, covered = case.load(np.zeros(2)), [], []
+    true = [moved(replace(any_load, x=s, y=0.0))[ring] for ring, s in enumerate(far)]
+    for frame in range(frames):
+        ring = frame % 12
+        x, y = _on_cap(cap, far[ring], 2 * pi * rng.uniform()).tolist()
+        curvature = read(replace(any_load, x=x, y=y))
+        curvature = curvature + rng.uniform(-case.noise, case.noise, curvature.shape)
+        found = contact(curvature, fit(curvature))
+        error = found.displacement - true[ring]
+        covered.append(abs(error) <= REACH * found.displacement_sd)
+        off.append(error / true[ring])
+    return np.mean(covered), np.mean(off), sqrt(np.mean(np.square(off)))
+
+
 ON_CAPS = {"least-squares": (6, 9), "bayes": (8, 15), "tracking": (8, 15)}
 # Of the fingertip in the scene, too.
 THICK = [

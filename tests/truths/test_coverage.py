@@ -22,6 +22,7 @@ from studies import (
     TWO,
     accused,
     coverage,
+    depths_on_cap,
     drifted,
     read_as_flat,
     robustness,
@@ -135,6 +136,17 @@ def test_the_place_on_a_cap_is_covered(case, frames):
 
     assert low <= found.x <= high
     assert low <= found.y <= high
+
+
+@pytest.mark.cases("fingertip of 1 mm, disc of 2.5 mm", "fingertip, disc of 1 mm")
+@each(CAP_SHAPES)
+@pytest.mark.parametrize("frames", [60, pytest.param(FEW, marks=pytest.mark.full)])
+def test_the_depth_on_a_cap_is_covered(case, frames):
+    covered, mean, rms = depths_on_cap(case, frames)
+
+    assert covered >= 0.92
+    # How a load is spread over its area is told only in part: a Gaussian load is the worst.
+    assert (abs(mean) < 0.08 and rms < 0.1) or ("Gaussian" in case.name and rms < 0.2)
 
 
 # A flat skin that stretches, of known thickness, pressed in by up to more than twice of it

@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
     QScrollArea,
     QStyle,
     QToolButton,
+    QVBoxLayout,
     QWidget,
 )
 
@@ -150,6 +151,15 @@ class Docks(QObject):
     def put_left(self, name: str, title: str, widget: QWidget, tip: str, share: float) -> None:
         """Put a widget in a column left of the skin; `share` is that of the window's width."""
         self._put(name, title, widget, Qt.DockWidgetArea.LeftDockWidgetArea, tip, {"": share})
+
+    def add_above(self, name: str, widget: QWidget) -> None:
+        """Put a widget above that of a dock, in the same dock."""
+        whole = QWidget()
+        column = QVBoxLayout(whole)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(widget)
+        column.addWidget(self._shown[name], 1)
+        self[name].setWidget(whole)
 
     def put_right(self, name: str, title: str, widget: QWidget, tip: str, share: float) -> None:
         """Put a widget in a column right of the skin; `share` is that of the window's width."""

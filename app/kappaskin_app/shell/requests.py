@@ -38,13 +38,15 @@ class Requests:
         rest = Settings(calibration=now.calibration, tare=now.tare)
         kept = (field.name for kind in (PublishSettings, Look) for field in fields(kind))
         values = {name: getattr(now, name) for name in kept}
-        self._history.change("Reset settings", -1, **vars(rest) | values)
+        self._history.reset("Reset settings", **vars(rest) | values)
 
     def reset_panel(self, title: str, names: Sequence[str]) -> None:
         """Reset some settings, with what follows from each."""
-        now, first = self._history.settings, Settings()
+        was = now = self._history.settings
+        first = Settings()
         for name in names:
             if getattr(now, name) != (value := getattr(first, name)):
                 now = replace(now, **with_consequences(now, self._session.scene, name, value))
-        changed = {field.name: getattr(now, field.name) for field in fields(Settings)}
-        self._history.change(f"Reset {title}", -1, **changed)
+        every = {field.name: getattr(now, field.name) for field in fields(Settings)}
+        changed = {n: v for n, v in every.items() if n in names or v != getattr(was, n)}
+        self._history.reset(f"Reset {title}", **changed)

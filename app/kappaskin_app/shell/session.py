@@ -16,9 +16,11 @@ from kappaskin.calibration import Calibration, Tare
 from kappaskin.errors import Refusal
 from kappaskin.estimation import Region, ScanTradeoff
 from kappaskin.frames import Estimate
+from kappaskin.hand import HandDescription
 from kappaskin.live import STREAMING, Engine, Fingers, ResumeInfo, Status
 from kappaskin.mechanics import Plate, PointLoad
 from kappaskin.pipeline import Setup
+from kappaskin.publish import of_finger
 from kappaskin.scenes import Scene
 from kappaskin.scenes.cylinders import CylinderStep, Presentation
 from kappaskin.sensing import Sensor
@@ -202,8 +204,12 @@ class Session(QObject):
         self.fingers = engine if isinstance(engine, Fingers) else None
         engines = {"": engine} if isinstance(engine, Engine) else engine.engines
         self.finger, engine = next(iter(engines.items()))
-        self._others = dict[str, tuple[str, Settings]]()
-        """Source and settings of each finger that is not shown."""
+        self.hand: HandDescription | None = None
+        """Where the fingers are, if that is known."""
+        self._sources = dict[str, str]()
+        """The source of each finger that is not shown."""
+        self._unplayed: set[str] = set()
+        """Those of them whose scene is to be that of their settings."""
         self._history = history
         self._settings = history.settings
         self.trusted: frozenset[Path] = frozenset()
@@ -214,6 +220,7 @@ class Session(QObject):
         self._seek_target: float | None = None
         self._seek_time = 0.0
         self._preparation = ScenePreparation(tasks, self._play)
+        self._preparation_of_others = ScenePreparation(tasks, self._play_others)
         self.base: Setup | None = None
         if engine.resumed is None:
             engine.set_up(_setup_of(history.settings))
@@ -233,6 +240,7 @@ class Session(QObject):
         self._next_status, self.closed = 0.0, False
         self._shown: tuple[int, int] = (0, -1)
         history.changed.connect(guarded(self._follow))
+        history.others_changed.connect(guarded(self._follow_others))
         self.timer = QTimer(self, interval=_TICK, timerType=Qt.TimerType.PreciseTimer)  # pyright: ignore[reportCallIssue]
         self.timer.timeout.connect(self.tick)
         self.timer.start()
@@ -336,12 +344,15 @@ class Session(QObject):
         self._history.change(f"Play {written.file.stem}", -1, written=written)
         self._play()
 
-    def begin_fingers(self, sources: Mapping[str, str]) -> None:
-        """Begin with the `sources` of a hand, which its engines read already."""
-        self._others = {
-            finger: (source, settings_for(source, self._trusts(source)))
-            for finger, source in sources.items()
-            if finger != self.finger
+    def begin_fingers(
+        self, sources: Mapping[str, str], hand: HandDescription | None = None
+    ) -> None:
+        """Begin with the `sources` of a hand, which its engines read already, and what it is."""
+        self.hand = hand
+        self._sources = {finger: each for finger, each in sources.items() if finger != self.finger}
+        self._history.others = {
+            finger: settings_for(source, self._trusts(source))
+            for finger, source in self._sources.items()
         }
 
     def show_finger(self, finger: str) -> None:
@@ -349,17 +360,16 @@ class Session(QObject):
 
         What could be undone was of the settings of the last one.
         """
-        if self.fingers is None or finger not in self._others:
+        if self.fingers is None or finger not in self._sources:
             return
         self.source_changing.emit()
-        self._others[self.finger] = self.source, self._history.settings
+        before, self._sources[self.finger] = self.finger, self.source
         self.finger, self.engine = finger, self.fingers.engines[finger]
-        self.source, settings = self._others.pop(finger)
+        self.source = self._sources.pop(finger)
         self.connecting, self.estimate, self._seek_target = "", None, None
         self.running, self._next_status = bool(self.engine.requested.speed), 0.0
         self._turned_at, self._lost_since = time.monotonic(), math.inf
-        self._history.apply(settings)
-        self._history.stack.clear()
+        self._history.show(finger, instead_of=before)
         self.source_changed.emit(self.source)
         if self.inside:
             self._play()
@@ -381,6 +391,40 @@ class Session(QObject):
         if part(settings, PublishSettings) != part(was, PublishSettings):
             self._publish()
         self._add_noise()
+
+    def _follow_others(self, before: Mapping[str, Settings]) -> None:
+        """Request what is set of the fingers that are not shown, and was as `before`.
+
+        Of one that plays a recording when it is shown: until then all is as it was recorded.
+        """
+        for finger, settings in self._history.others.items():
+            source, engine = self._sources[finger], self._engine_of(finger)
+            if source.startswith(RECORDED):
+                continue
+            inside = source.startswith("sim:")
+            setup = _setup_of(settings, engine.status().sensor)
+            if not inside:
+                setup = replace(setup, hold=max(setup.hold, _turn(region_of(settings))))
+                engine.add_noise(settings.added_noise)
+            engine.set_up(setup)
+            engine.scan(region_of(settings))
+            if part(settings, PublishSettings) != part(before[finger], PublishSettings):
+                self._publish_to(settings, finger)
+            if inside and part(settings, SceneSettings) != part(before[finger], SceneSettings):
+                self._unplayed.add(finger)
+        self._play_others()
+
+    def _play_others(self) -> None:
+        """Simulate the scenes of the fingers that are not shown, once each is computed."""
+        for finger in self._unplayed & self._history.others.keys():
+            if not self._preparation_of_others.ready(settings := self._history.others[finger]):
+                return
+            with suppress(Refusal):  # which is told once it is shown
+                self._engine_of(finger).play(planned_scene(scene_of(settings)))
+            self._unplayed.discard(finger)
+
+    def _engine_of(self, finger: str) -> Engine:
+        return self.fingers.engines[finger] if self.fingers else self.engine
 
     def set_calibrating(self, calibrating: bool) -> None:
         """Add no noise to what is shown while a calibration captures it."""
@@ -415,13 +459,19 @@ class Session(QObject):
 
     def _publish(self) -> None:
         """Publish to the requested targets, or to none and report why."""
-        why = ""
+        self.publish_refused.emit(self._publish_to(self._settings, self.finger))
+
+    def _publish_to(self, settings: Settings, finger: str) -> str:
+        """Publish a finger to the targets of its settings, or to none; why there are none."""
+        engine, number = self._engine_of(finger), 0
+        if self.fingers is not None:
+            number = list(self.fingers.engines).index(finger)
         try:
-            self.engine.publish(self._settings.targets, self._settings.origins)
+            engine.publish(of_finger(settings.targets, number), settings.origins)
         except Refusal as refusal:
-            why = str(refusal)
-            self.engine.publish([])
-        self.publish_refused.emit(why)
+            engine.publish([])
+            return str(refusal)
+        return ""
 
     def lay(self, step: CylinderStep | None) -> None:
         """Lay the simulated skin on the cylinder of `step`.

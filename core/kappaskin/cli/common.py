@@ -66,7 +66,8 @@ Sources = Annotated[
         name="--source",
         negative="",
         allow_leading_hyphen=True,
-        help="The source of one finger of a hand, as NAME=SOURCE; may be given several times.",
+        help="The source of one finger of a hand, as NAME=SOURCE; may be given several times. Or a "
+        "hand: hand:NAME, or the file of its description.",
     ),
 ]
 """An option for `fingers_of`."""
@@ -142,8 +143,10 @@ def fingers_of(
 ) -> dict[str, str]:
     """The source of each finger by its name, empty where there is one without, and no other.
 
-    Each has the description of its own in `sensors`, or the one without a name.
+    One source alone may name a hand by its description, or a recording of one. Each has the
+    description of its own in `sensors`, or the one without a name.
     """
+    from kappaskin.hand import named_hand
     from kappaskin.recording import Recording, ReplayedSource
     from kappaskin.sources import named_sources
 
@@ -158,6 +161,8 @@ def fingers_of(
         with Recording(Path(only.partition(":")[2])) as recording:
             if len(recording.fingers) > 1:
                 named = {finger: f"{only}#{finger}" for finger in recording.fingers}
+    elif (hand := named_hand(only)) is not None:
+        named = hand.sources
     files = dict[str, Path]()
     for text in sensors or ():
         finger, found, file = text.partition("=")

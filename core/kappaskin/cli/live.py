@@ -69,7 +69,8 @@ def publish(
     Parameters
     ----------
     source
-        `sim:`, `sim:SCENE`, `feed:NAME`, or a port or URL for pyserial.
+        `sim:`, `sim:SCENE`, `feed:NAME`, or a port or URL for pyserial; of a hand `hand:NAME`, or
+        the file of its description.
     udp
         HOST:PORT to send JSON datagrams to; may be given several times.
     cue

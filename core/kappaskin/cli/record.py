@@ -70,7 +70,8 @@ def record(
     Parameters
     ----------
     source
-        `sim:`, `sim:SCENE`, `feed:NAME`, or a port or URL for pyserial.
+        `sim:`, `sim:SCENE`, `feed:NAME`, or a port or URL for pyserial; of a hand `hand:NAME`, or
+        the file of its description.
     out
         The file; it must not exist yet.
     seconds

@@ -69,6 +69,7 @@ _RIM = 1 / 15  # of a side: within it, a load moves the skin too little to be to
 _TO_GAUSSIAN = 0.5  # of the way from a disc: the profile of a load, whose standard deviation is as
 _FURTHER = -1.0, 2.0  # much; and how far along that way slopes are followed
 
+_OF_PROFILE = 0.1  # of what its width takes off the displacement under a load: it may be no disc
 _OF_PLACE = 0.06  # of the shorter side: error of a place on a mesh, times that of a force
 _AS_WELL = 1.2  # times the residual of the fitted shape that a single load may leave
 _REGION = 7.81  # variances: drop of chi-squared in the 95 % region of x, y and size
@@ -451,21 +452,27 @@ class PointContact:
         of_place = theory if self.patch.is_shallow else 0.0
         on_mesh = _OF_PLACE * theory * self._side if isinstance(self.patch, MeshSkin) else 0.0
         self.misfit = (spread / float(fit.noise)) ** 2 if fit.noise else math.inf
-        under = force * self._influence.gives(x, y)
-        if self._stretched is not None:
-            under += self._stretched.more(x, y, force)
         sd_x = math.hypot(sd[1] / strength, of_place * (x - self.patch.a / 2), on_mesh)
         sd_y = math.hypot(sd[2] / strength, of_place * (y - self.patch.b / 2), on_mesh)
+        size = (s, sd[3] / strength) if self._influence.sized else (math.nan, math.nan)
+        single, near_rim = (
+            spread < _AS_WELL * float(fit.noise),
+            self._near_rim(x, y, s, here, tables),
+        )
+        if self._nodes is not None and single and not near_rim:
+            under = self._under_load(x, y, s, here, spread)
+        else:
+            under = self._under_fit(fit, x, y, force)
         return Contact(
             np.array([x, y]),
             np.array([sd_x, sd_y]),
             force,
             math.hypot(sd[0] * unit, theory * force),
-            *self._displacement(fit, x, y, under),
+            *under,
             tables.spare,
-            spread < _AS_WELL * float(fit.noise),
-            self._near_rim(x, y, s, here, tables),
-            *((s, sd[3] / strength) if self._influence.sized else (math.nan, math.nan)),
+            single,
+            near_rim,
+            *size,
         )
 
     def _near_rim(self, x: float, y: float, s: float, here: _Linearised, tables: _Tables) -> bool:
@@ -488,12 +495,38 @@ class PointContact:
                 return True
         return False
 
-    def _displacement(self, fit: Fit, x: float, y: float, under: float) -> tuple[float, float]:
+    def _under_load(
+        self, x: float, y: float, s: float, here: _Linearised, spread: float
+    ) -> tuple[float, float]:
+        """Displacement in m under the load, on a cap or a mesh, and its standard deviation.
+
+        Where a point load P moves a shallow sphere of bending stiffness D by w0 = P l^2 / (8 D), a
+        disc of radius mu l that bears as much moves it by 8 w0 (1 + mu ker' mu) / (pi mu^2) (E.
+        Reissner, Stresses and small displacements of shallow spherical shells II, 1946).
+        """
+        unit, most = self._influence.unit, self._influence.gives(x, y)
+        length = math.sqrt(unit * most / math.pi)
+        mu = math.sqrt(s) / length
+        held = 1 + mu * float(scipy.special.kerp(mu))
+        share = 8 * held / (math.pi * mu**2)
+        by_mu = -8 * (float(scipy.special.kei(mu)) / mu + 2 * held / mu**3) / math.pi
+        # Of the force, and of force times size.
+        gradient = unit * most * np.array([share, by_mu / (2 * length * math.sqrt(s))])
+        of_noise = spread**2 * float(gradient @ here.inverse[::3, ::3] @ gradient)
+        under = here.steps[0] * unit * most
+        theory, profile = self._theory_error * share, _OF_PROFILE * (1 - share)
+        inexact = under * math.hypot(theory, profile)
+        return under * share, math.hypot(math.sqrt(of_noise), inexact)
+
+    def _under_fit(self, fit: Fit, x: float, y: float, force: float) -> tuple[float, float]:
         """Displacement in m of the fitted shape at (x, y), and its standard deviation.
 
-        Besides the noise it includes the difference to the displacement `under` the load, which is
+        Besides the noise it includes the difference to the displacement under the load, which is
         finer than the fit's functions.
         """
+        under = force * self._influence.gives(x, y)
+        if self._stretched is not None:
+            under += self._stretched.more(x, y, force)
         shape, covariance = fit.jet(x, y)
         fitted, observed = float(shape[0]), float(covariance[0, 0])
         observed = math.sqrt(observed) if observed >= 0 else math.nan

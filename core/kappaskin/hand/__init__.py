@@ -9,7 +9,9 @@ from kappaskin.hand.description import HandDescription as HandDescription
 from kappaskin.hand.description import Linkage as Linkage
 from kappaskin.hand.description import angles_from_json as angles_from_json
 from kappaskin.hand.description import hand_file as hand_file
+from kappaskin.hand.description import is_hand as is_hand
 from kappaskin.hand.description import load_hand as load_hand
+from kappaskin.hand.description import named_hand as named_hand
 from kappaskin.hand.exploration import ContactMotion as ContactMotion
 from kappaskin.hand.exploration import ObjectMap as ObjectMap
 from kappaskin.hand.exploration import ObjectMotion as ObjectMotion

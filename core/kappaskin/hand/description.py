@@ -2,6 +2,7 @@
 
 import math
 import time
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from importlib.resources import files
@@ -230,6 +231,11 @@ class HandDescription:
                 )
 
     @property
+    def sources(self) -> dict[str, str]:
+        """The source of each finger by its name."""
+        return {finger.name: finger.source for finger in self.fingers}
+
+    @property
     def joints(self) -> dict[str, tuple[float, float]]:
         """The limits in rad or m of each joint whose value `placements` needs."""
         return {} if self.linkage is None else self.linkage.joints
@@ -428,6 +434,26 @@ def _open(name: str, trust: bool) -> SimulatedSource:
 
 
 register_scheme(SCHEME, _open)
+
+
+def is_hand(file: Path) -> bool:
+    """Whether a TOML file describes a hand: it has a table [[finger]]."""
+    try:
+        return "finger" in tomllib.loads(read_file(file, _LARGEST).decode("utf-8-sig"))
+    except (OSError, ValueError, RecursionError):
+        return False
+
+
+def named_hand(source: str, trust: Trust = False) -> HandDescription | None:
+    """The hand that a `source` names: `hand:NAME` is a ready one, FILE.toml one of your own.
+
+    None for any other source, as for `hand:NAME#FINGER`, which is that of one finger.
+    """
+    name = source.removeprefix(SCHEME)
+    if name == source:
+        mine = source.endswith(_ENDING) and is_hand(Path(source))
+        return load_hand(Path(source), trust) if mine else None
+    return None if "#" in name else load_hand(hand_file(name), trust)
 
 
 def _text(file: Path, what: str) -> str:

@@ -66,9 +66,8 @@ def finger_contact(
     """The contact of a `finger` whose skin is at `where`; None without one, or too near the rim.
 
     From the `estimate` of a frame and the `fit` that the pipeline made it of. The depth is that of
-    the contact, whose error bar has what the functions of the fit do not resolve. That of the
-    normal has what the normals of the skin deflected and at rest differ by: under a small load the
-    slopes of the fit may be as far off.
+    the contact. The error bar of the normal has what the normals of the skin deflected and at rest
+    differ by: under a small load the slopes of the fit may be as far off.
     """
     contact, geometry = estimate.contact, estimate.geometry
     if not contact.present or contact.near_rim:

@@ -22,7 +22,6 @@ _CONTACTS = 1000.0  # a second at most
 _HEAVY = 50.0  # a second at most, of what is as large as a frame
 _BYTES = 4e6  # a second at most, of that
 _BURST = 5  # that may come at once, as frames do
-_INFO = 20  # what a log calls what is no warning
 _FLOAT32 = 7  # what a point cloud calls it
 _NO_TRUTH = Truth(np.empty((0, 0)), np.full(2, math.nan), "")
 _COLUMNS = ("x", "y", "z", "displacement")
@@ -153,18 +152,7 @@ class Recorder:
         self._file.put(m.LEFT_OUTS, self._now, encode(m.LEFT_OUT, fields))
 
     def add_event(self, event: Event) -> None:
-        stamp = self._file.stamp(event.time)
-        fields = {
-            "stamp.sec": stamp // 10**9,
-            "stamp.nanosec": stamp % 10**9,
-            "level": _INFO,
-            "name": event.kind,
-            "msg": event.text,
-            "file": "",
-            "function": "",
-            "line": 0,
-        }
-        self._file.put(m.EVENTS, event.time, encode(m.LOG, fields))
+        self._file.put(m.EVENTS, event.time, m.pack_event(event, self._file.stamp(event.time)))
 
     def take(self, frame: Frame, estimate: Estimate) -> None:
         """Record the estimate of a frame, as often as the rate allows."""

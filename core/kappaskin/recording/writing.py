@@ -22,9 +22,10 @@ from mcap.writer import CompressionType, Writer
 
 from kappaskin._processes import starting_process
 from kappaskin.errors import Refusal
+from kappaskin.frames import Event
 from kappaskin.pipeline import REVISION
 from kappaskin.recording.disk import ReservedFile, is_there
-from kappaskin.recording.messages import LINES, TOPICS, Topic, pack_line
+from kappaskin.recording.messages import EVENTS, LINES, TOPICS, Topic, pack_event, pack_line
 
 FORMAT, HAND_FORMAT = 1, 2
 """Versions of the meaning of our own messages: of a file without, and with, names of fingers."""
@@ -43,6 +44,7 @@ _SUMMED = 512  # bytes of the end of the file for each chunk
 _UNDATED = 0
 _KEY = 32  # bytes
 _SILENT = 5.0  # s that a finger may take to end, each of which sends every 0.1 s
+_DIED = "the engine process ended unexpectedly; its last 0.1 s are missing"
 _WRITER = "the process that writes the recording"
 
 
@@ -288,6 +290,7 @@ class HandLine(RecordingQueue):
                 while not self._closing.wait(_FLUSH):
                     self._send(line)
                 self._send(line)
+                line.send(None)
             self._stop("")
         except (OSError, EOFError, AuthenticationError):
             self._stop(f"{self.path.name}: {_WRITER} has ended")
@@ -406,16 +409,17 @@ class _HandWriter:
         while not self._over:
             for ready in wait([*self._lines, *([] if self._ending else [self._pipe])], _FLUSH):
                 line = cast("Connection[Any, Any]", ready)
+                died = False
                 try:
                     received = line.recv()
                 except (EOFError, OSError):
-                    received = None
+                    received, died = None, True
                 if line is self._pipe and received:
                     self._report()
                 elif line is self._pipe:
                     self._ending, self._heard = True, time.monotonic()
                 elif received is None:
-                    self._close(line)
+                    self._close(line, died)
                 else:
                     self._take(self._lines[line], *received)
         self._file.close()
@@ -440,10 +444,13 @@ class _HandWriter:
         self._heard = time.monotonic()
         self._file.wait()
 
-    def _close(self, line: "Connection[Any, Any]") -> None:
-        """A finger's process ended, or its recording: what comes next is of another connection."""
-        topic, now = LINES.of(self._lines.pop(line)), time.monotonic()
-        self._file.put(topic, now, pack_line(now, False, b""))
+    def _close(self, line: "Connection[Any, Any]", died: bool) -> None:
+        """A finger's recording ended, or its process `died`: what comes next is another's."""
+        finger, now = self._lines.pop(line), time.monotonic()
+        if died:
+            event = pack_event(Event(now, "engine", _DIED), self._file.stamp(now))
+            self._file.put(EVENTS.of(finger), now, event)
+        self._file.put(LINES.of(finger), now, pack_line(now, False, b""))
         line.close()
 
     def _report(self) -> None:

@@ -141,3 +141,56 @@ def test_a_change_is_told_in_its_own_words_and_unit(name: str, value: object, wo
 def test_every_setting_has_words() -> None:
     for field in fields(Settings):
         assert change_text(field.name, Settings(), Settings())
+
+
+def of_a_hand(**others: int) -> History:
+    """The history of a hand, whose other fingers have so many functions."""
+    history = History(Settings())
+    history.others = {name: Settings(functions_x=count) for name, count in others.items()}
+    return history
+
+
+def functions(history: History) -> list[int]:
+    return [each.functions_x for each in (history.settings, *history.others.values())]
+
+
+def test_a_request_of_all_fingers_is_undone_to_what_each_had(qapp: QApplication) -> None:
+    history = of_a_hand(index=10, ring=12)
+    history.set_of_all(True)
+    history.request("functions_x", functions_x=5)
+    assert functions(history) == [5, 5, 5]
+    assert history.stack.undoText().endswith(", all fingers")
+    history.stack.undo()
+    assert functions(history) == [8, 10, 12]
+    history.stack.redo()
+    assert functions(history) == [5, 5, 5]
+
+
+def test_a_request_of_one_finger_leaves_the_others_alone(qapp: QApplication) -> None:
+    history = of_a_hand(index=10)
+    history.request("functions_x", functions_x=5)
+    assert functions(history) == [5, 10]
+    history.set_of_all(True)  # in the same second, and yet a step of its own
+    history.request("functions_x", functions_x=6)
+    history.stack.undo()
+    assert functions(history) == [5, 10]
+
+
+def test_what_is_of_one_skin_is_never_set_of_all_fingers(qapp: QApplication) -> None:
+    history = of_a_hand(index=10)
+    history.set_of_all(True)
+    history.request("force", force=0.7)
+    history.reset("Reset Basis", functions_x=8, side_x=0.2)
+    assert functions(history) == [8, 8]
+    assert (history.others["index"].force, history.others["index"].side_x) == (
+        Settings().force,
+        Settings().side_x,
+    )
+
+
+def test_the_settings_of_another_finger_become_the_present_ones(qapp: QApplication) -> None:
+    history = of_a_hand(index=10)
+    history.request("functions_x", functions_x=5)
+    history.show("index", instead_of="thumb")
+    assert functions(history) == [10, 5]
+    assert not history.stack.canUndo()

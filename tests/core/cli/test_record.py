@@ -17,7 +17,7 @@ import psutil
 import pytest
 
 from kappaskin.cli import main
-from kappaskin.cli.common import ProgressLine
+from kappaskin.cli.common import ProgressLine, fingers_of
 from kappaskin.cli.record import _recorded
 from kappaskin.live import Status
 from kappaskin.recording import Recording, RecordingStatus
@@ -266,6 +266,18 @@ def test_each_finger_is_exported_or_the_one_that_is_named(hand, tmp_path, capsys
     assert (tmp_path / "press-index.csv").read_bytes() == out.read_bytes()
 
 
+def test_a_hand_is_named_by_its_description(tmp_path) -> None:
+    hand = tmp_path / "hand.toml"
+    fingers = (f'[[finger]]\nname = "{n}"\nsource = "sim:{n}"\nposition = [0, 0, 0]' for n in "ab")
+    hand.write_text("\n".join(["format = 1", *fingers]))
+    named = {"a": "sim:a", "b": "sim:b"}
+    assert fingers_of(str(hand), None, None) == fingers_of(None, [str(hand)], None) == named
+    assert list(fingers_of("hand:three-fingertips", None, None)) == ["thumb", "index", "middle"]
+    assert fingers_of("hand:three-fingertips#thumb", None, None) == {
+        "": "hand:three-fingertips#thumb"
+    }
+
+
 @pytest.mark.parametrize(
     ("arguments", "why"),
     [
@@ -274,6 +286,7 @@ def test_each_finger_is_exported_or_the_one_that_is_named(hand, tmp_path, capsys
         (["sim:", "--source", "a=sim:", "--out", "a.mcap"], "NAME=SOURCE .* got both"),
         (["--out", "a.mcap"], "expected a source such as sim:.* got none"),
         (["--source", "a=replay:x.mcap"], "expected a live source to record"),
+        (["--source", "hand:mine"], "expected a hand among .*three-fingertips"),
     ],
 )
 def test_a_hand_that_is_none_is_refused(arguments, why, tmp_path, monkeypatch, capsys) -> None:

@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from kappaskin import Refusal
-from kappaskin.hand import Linkage, angles_from_json, load_hand, placement
+from kappaskin.hand import Linkage, angles_from_json, is_hand, load_hand, named_hand, placement
 
 READY = Path(str(files("kappaskin_resources"))) / "hands" / "three-fingertips.toml"
 
@@ -143,3 +143,29 @@ def test_joint_values_come_as_a_json_object():
     assert angles_from_json('{"base": 0.5, "out": 0}') == {"base": 0.5, "out": 0.0}
     with pytest.raises(Refusal, match="expected a number, got 'half'"):
         angles_from_json('{"base": "half"}')
+
+
+def test_a_hand_is_named_as_a_source(tmp_path, monkeypatch):
+    ready = named_hand("hand:three-fingertips")
+    assert ready is not None
+    assert ready.sources == dict.fromkeys(("thumb", "index", "middle"), "sim:fingertip-cap")
+
+    mine = named_hand(str(written(tmp_path, f"format = 1\n{FINGER}")))
+    assert mine is not None
+    assert mine.sources == {"index": "sim:fingertip-cap"}
+
+
+@pytest.mark.parametrize("source", ["sim:", "", "hand:three-fingertips#thumb", "none.toml"])
+def test_another_source_names_no_hand(source):
+    assert named_hand(source) is None
+
+
+def test_a_hand_that_is_not_ready_is_refused_with_those_that_are():
+    with pytest.raises(Refusal, match=r"a hand among .*three-fingertips.*, or a file; got 'mine'"):
+        named_hand("hand:mine")
+
+
+def test_a_scene_or_a_file_that_cannot_be_read_is_no_hand(tmp_path):
+    assert is_hand(READY)
+    assert not is_hand(READY.parents[1] / "scenes" / "demo.toml")
+    assert not is_hand(tmp_path / "none.toml")

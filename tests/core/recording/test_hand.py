@@ -175,6 +175,22 @@ def test_a_finger_that_ends_leaves_the_others_alone(recorder: HandRecorder) -> N
         assert recording.attachment("a.toml") == b"a = 1"
 
 
+def test_a_finger_that_dies_is_told_in_the_file(recorder: HandRecorder) -> None:
+    part = recorder.part("thumb")
+    with Client(part.address, authkey=part.key) as dies:
+        dies.send("thumb")
+        dies.send(([], [(m.LINES.name, 1.0, line(1))]))
+        assert wait_for(lambda: recorder.poll().messages == 1)
+    with closing(HandLine(recorder.part("index_2"))) as index:
+        index.put(m.LINES, 2.0, line(2))
+    recorder.close()
+    with Recording(recorder.path, "thumb") as recording:
+        (event,) = recording.events()
+    assert (event.kind, "ended unexpectedly" in event.text) == ("engine", True)
+    with Recording(recorder.path, "index_2") as recording:
+        assert not list(recording.events())
+
+
 def test_its_state_is_told_while_it_writes(recorder: HandRecorder) -> None:
     with closing(HandLine(recorder.part("thumb"))) as thumb:
         thumb.put(m.LINES, 1.0, line(1))

@@ -219,6 +219,8 @@ class DesignPanel(QWidget):
         prediction, placed = self._prediction, self._prediction and self._prediction.placed
         check = prediction.check if prediction else None
         patch = placed.scene.plate.patch if placed else None
+        on_mesh = isinstance(patch, MeshSkin)
+        self.form.show_functions("design_functions_x", "design_functions_y", on_mesh)
         sides = (1.0, 1.0) if patch is None else (patch.a, patch.b)
         shown = [] if found is None else [found.sd]
         if found is not None and check is not None and found.of == "displacement":

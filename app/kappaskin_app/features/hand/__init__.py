@@ -1,6 +1,7 @@
 """Hand: a small map of each finger; a click shows the finger in the window."""
 
 import time
+from pathlib import Path
 
 import numpy as np
 from PySide6.QtCore import Qt, QTimer, Signal
@@ -8,13 +9,19 @@ from PySide6.QtGui import QMouseEvent
 from PySide6.QtWidgets import QButtonGroup, QHBoxLayout, QRadioButton, QVBoxLayout, QWidget
 
 from kappaskin._text import with_error
+from kappaskin.errors import Refusal
 from kappaskin.frames import Estimate
+from kappaskin.hand import is_hand
 from kappaskin.live import Status
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.badge import LIVE, SIM, origin, state_of
 from kappaskin_app.shell.colouring import SteadyRange, largest
+from kappaskin_app.shell.opening import Kind
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.window import MainWindow
+from kappaskin_app.theme import FAINT
+from kappaskin_app.widgets.layout import Flow
+from kappaskin_app.widgets.parts import Label, text_label
 from kappaskin_app.widgets.surface_map import SurfaceMap
 from kappaskin_app.widgets.text import Coverage
 
@@ -99,11 +106,53 @@ class HandPanel(QWidget):
             self.views[finger].show_finger(status, estimate)
 
 
+_OF_ALL = (
+    "Basis, estimator, noise, electronics, scan, view and publishing are set of every finger; "
+    "skin, load, scene, calibration and tare of the finger that is shown"
+)
+
+
+class SettingsScope(QWidget):
+    """What settings are of: the finger that is shown, or all; `changed` brings whether of all."""
+
+    changed = Signal(bool)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.one, self.all = QRadioButton(), QRadioButton("all fingers")
+        self.one.setChecked(True)
+        self.all.setToolTip(_OF_ALL)
+        self.all.toggled.connect(self.changed)
+        self.note = text_label(tip=_OF_ALL)
+        self.note.setForegroundRole(FAINT)
+        self.note.hide()
+        self.all.toggled.connect(self.note.setVisible)
+        row = Flow()
+        for widget in (Label("Settings of"), self.one, self.all):
+            row.addWidget(widget)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(8, 4, 8, 4)
+        column.addLayout(row)
+        column.addWidget(self.note)
+
+    def show_finger(self, finger: str) -> None:
+        self.one.setText(finger)
+        self.one.setToolTip(f"Settings are of {finger} alone")
+        self.note.setText(f"Skin, load, scene, calibration and tare: of {finger} alone.")
+
+
+def _begin_with(file: Path) -> None:
+    raise Refusal(
+        f"{file.name} describes a hand, which a window begins with: `kappaskin app {file.name}`"
+    )
+
+
 class HandFeature:
     name = "hand"
 
     def install(self, shell: MainWindow) -> None:
         session = shell.session
+        shell.opening.add(Kind("hand", (".toml",), _begin_with, is_hand))
         if session.fingers is None:
             return
         self.panel = panel = HandPanel(session)
@@ -111,6 +160,10 @@ class HandFeature:
             "hand", "Hand", panel, "Ctrl+Alt+H", _ABOUT, height=0.34, layouts={"Live": 0.34}
         )
         panel.chosen.connect(guarded(session.show_finger))
-        session.finger_changed.connect(guarded(panel.mark))
-        panel.mark(session.finger)
+        self.scope = SettingsScope()
+        self.scope.changed.connect(guarded(shell.history.set_of_all))
+        shell.docks.add_above("settings", self.scope)
+        for show in (panel.mark, self.scope.show_finger):
+            session.finger_changed.connect(guarded(show))
+            show(session.finger)
         shell.begun.connect(guarded(lambda *_: shell.docks.reveal("hand")))

@@ -66,6 +66,17 @@ class Settings(
     tare: Tare | None = None
 
 
+_EACH = {"noise_seed", "region_elements", "traced"}  # of one finger: its elements, its noise
+SHARED = {
+    field.name
+    for kind in (
+        *(EstimatorSettings, View, Noise, AddedNoise, Electronics, GageEffects),
+        *(Scanning, PublishSettings),
+    )
+    for field in fields(kind)
+} - _EACH
+"""The settings that may be changed of all fingers of a hand at once, by name."""
+
 _ARROW = "\N{RIGHTWARDS ARROW}"
 _PANELS = {
     LoadSettings: "load",

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QColor
-from PySide6.QtWidgets import QApplication, QFileDialog
+from PySide6.QtWidgets import QApplication, QFileDialog, QLabel
 
 from kappaskin import Plate, Scene, SensorLayout, load_scene, write_scene
 from kappaskin.errors import Refusal
@@ -226,6 +226,7 @@ def test_the_map_of_the_open_scene_colours_the_skin_while_the_panel_is_visible(
 
     assert window.membrane.caption.input.startswith("Colours: RMS error of the force under 0.1 N")
     assert selection.map.tint.unit == window.design.predicted.unit == "%"
+    assert "Functions, N =" in {label.text() for label in window.design.form.findChildren(QLabel)}
     np.testing.assert_array_equal(selection.map.positions, prediction.prospect.positions)
     window.design.on_skin.setChecked(False)
     assert selection.map is None

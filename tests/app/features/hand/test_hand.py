@@ -86,3 +86,43 @@ def test_one_recording_holds_all_fingers(hand, until, tmp_path):
 
     with Recording(tmp_path / "hand.mcap") as recording:
         assert set(recording.fingers) == set(SOURCES)
+
+
+def test_a_setting_of_all_fingers_reaches_each_engine_and_is_undone(hand):
+    scope, fingers = hand.features["hand"].scope, hand.session.fingers
+    assert scope.one.text() == "thumb"
+    assert not scope.note.isVisible()
+    QTest.mouseClick(scope.all, Qt.MouseButton.LeftButton)
+    assert scope.note.isVisible()
+    hand.requests.set("functions_x", 5)
+    hand.requests.set("noise_rms", 2.0)
+    assert [each.requested.setup.Ni for each in fingers.engines.values()] == [5, 5]
+
+    hand.history.stack.undo()
+    hand.history.stack.undo()
+    assert [each.requested.setup.Ni for each in fingers.engines.values()] == [8, 8]
+
+    choose(hand, "index")
+    assert scope.one.text() == "index"
+    assert scope.all.isChecked()
+    QTest.mouseClick(scope.one, Qt.MouseButton.LeftButton)
+    hand.requests.set("functions_x", 6)
+    assert [each.requested.setup.Ni for each in fingers.engines.values()] == [8, 6]
+
+
+def test_noise_of_all_fingers_is_simulated_by_each(opened, until):
+    sources = {"thumb": "sim:", "index": "sim:line"}
+    fingers = Fingers(sources)
+    fingers.connect(sources)
+    window = opened("sim:", fingers)
+    window.session.begin_fingers(sources)
+    until(lambda: window.session.estimate is not None)
+    window.history.set_of_all(True)
+    window.requests.set("noise_rms", 2.0)
+    until(
+        lambda: all(
+            engine.requested.scene is not None
+            and any(getattr(effect, "rms", 0) == 2.0 for effect in engine.requested.scene.effects)
+            for engine in fingers.engines.values()
+        )
+    )
