@@ -2,6 +2,7 @@
 
 from kappaskin.hand import OperatorStatus
 from kappaskin_app.features.operator.control import OperatorControl
+from kappaskin_app.features.operator.driving import HandDriving
 from kappaskin_app.features.operator.feeling import Feeling
 from kappaskin_app.features.operator.panel import OperatorPanel
 from kappaskin_app.guard import guarded
@@ -18,11 +19,14 @@ class OperatorFeature:
     def install(self, shell: MainWindow) -> None:
         self._shell = shell
         self.operator = panel = OperatorPanel()
-        self.control = control = OperatorControl(shell.history, panel.pad)
+        self.driving = driving = HandDriving(shell.session, shell.tasks)
+        self.control = control = OperatorControl(shell.history, panel.pad, driving.begin)
         self.feeling, self.tones = Feeling(shell.session), Sound(control)
         shell.docks.put_below("operator", "Operator", panel, "Ctrl+Alt+O", _ABOUT, height=0.36)
         shell.panels.join(panel.form)
         shell.settings_shown.connect(guarded(panel.show_settings))
+        control.followers.append(driving.follow)
+        driving.reported.connect(guarded(panel.show_hand))
         panel.shown.connect(guarded(control.set_visible))
         panel.enabled.connect(guarded(control.switch))
         panel.gripped.connect(guarded(control.set_grip))
@@ -34,6 +38,7 @@ class OperatorFeature:
         self.feeling.felt.connect(guarded(self._feel))
         self.tones.ended.connect(guarded(self._report_no_sound))
         shell.closing.connect(guarded(control.close))
+        shell.closing.connect(guarded(driving.close))
 
     def _follow(self, status: OperatorStatus) -> None:
         self.operator.show_status(status)

@@ -23,7 +23,6 @@ from kappaskin_app.shell.settings.operation import GAMEPAD, PAD, UDP
 
 _EVERY = 8  # ms between two targets
 _SHOWN = 5  # of them between two reports
-_GRIPS = 0.5  # s for which a grip that is set is followed
 
 
 def limits_of(settings: Settings) -> OperatorLimits:
@@ -37,7 +36,7 @@ def limits_of(settings: Settings) -> OperatorLimits:
 
 
 class OperatorControl(QObject):
-    """Follows the input while it is `enabled`; off at first.
+    """Follows the input while it is `enabled`; off at first, and at `start`.
 
     `reported` brings the status, about 25 times a second; `switched` whether it is enabled;
     `refused` why the process does not run, `ended` that it has ended. `followers` get each target
@@ -49,15 +48,15 @@ class OperatorControl(QObject):
     refused = Signal(str)
     ended = Signal()
 
-    def __init__(self, history: History, pad: Pad) -> None:
+    def __init__(self, history: History, pad: Pad, start: Callable[[], HandTarget]) -> None:
         super().__init__()
-        self._history, self._pad = history, pad
+        self._history, self._pad, self._start = history, pad, start
         self.followers: list[Callable[[HandTarget], object]] = []
         self.enabled = self._visible = False
         self.status = OperatorStatus(HandTarget())
         self._filter = TargetFilter(limits_of(history.settings), HandTarget())
         self.link: OperatorLink | None = None
-        self._grip, self._grip_until = 0.0, 0.0
+        self._grip: float | None = None
         self.rumble = 0.0
         """How strongly a gamepad rumbles, as a share of the strongest."""
         self._input, self._ticks = history.settings.operator_input, 0
@@ -74,6 +73,8 @@ class OperatorControl(QObject):
 
     def _begin(self) -> None:
         try:
+            if not self.status.target.time:
+                self.status = OperatorStatus(self._start())
             self.link = self.link or OperatorLink(self.status.target)
             self._timer.start()
         except Refusal as refusal:
@@ -84,14 +85,14 @@ class OperatorControl(QObject):
         if on:
             self._begin()
         if (on := on and self.link is not None) != self.enabled:
-            self.enabled = on
+            self.enabled, self._grip = on, None
             self.switched.emit(on)
             self.set_visible(self._visible)
 
     def set_grip(self, share: float) -> None:
         """Grip with a `share` of the largest force."""
-        self._grip = share * self._filter.limits.grip
-        self._grip_until = time.monotonic() + _GRIPS
+        if self.enabled:
+            self._grip = share * self._filter.limits.grip
 
     def _tick(self) -> None:
         settings = self._history.settings
@@ -141,8 +142,10 @@ class OperatorControl(QObject):
         """What the pad wants, with the grip that is set."""
         at = self._filter.target
         wanted = self._pad.wanted(at, limits, now - at.time)
-        if now < self._grip_until:
-            wanted = replace(wanted or at, grip=self._grip)
+        if self._grip is not None:
+            wanted = replace(wanted or at, grip=min(self._grip, limits.grip))
+            if wanted.grip == self.status.target.grip:
+                self._grip = None
         return wanted
 
     def close(self) -> None:

@@ -101,6 +101,7 @@ class OperatorPanel(QWidget):
         self.state, self.hint, self.message = Heading(_LETTERS), text_label(), text_label()
         self.message.setForegroundRole(ALERT)
         self._settings = Settings()
+        self._hand = ""
         self._reports = deque[OperatorStatus](maxlen=_RATES)
         self.numbers = {
             name: text_label(tip=tip)
@@ -157,6 +158,10 @@ class OperatorPanel(QWidget):
         with QSignalBlocker(self.enable):
             self.enable.setChecked(on)
 
+    def show_hand(self, trouble: str) -> None:
+        """Show what is wrong with the simulated hand; empty if nothing is."""
+        self._hand = trouble
+
     def show_status(self, status: OperatorStatus) -> None:
         """Show the target, the counts, and what is wrong."""
         if status.target.time:
@@ -179,7 +184,9 @@ class OperatorPanel(QWidget):
             if text != self.numbers[name].text():
                 self.numbers[name].setText(text)
         refusal = f"Last refused: {status.refusal}" if status.refusal else ""
-        self.message.setText("\n".join(map(sentence, filter(None, (status.trouble, refusal)))))
+        self.message.setText(
+            "\n".join(map(sentence, filter(None, (status.trouble, self._hand, refusal))))
+        )
 
     def _texts(self, status: OperatorStatus) -> dict[str, str]:
         """Each number as text."""

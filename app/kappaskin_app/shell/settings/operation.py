@@ -58,7 +58,7 @@ class OperationSettings:
         ),
     )
     operator_grip: float = setting(
-        2.0, Range("Grip", "Largest force with which each finger grips.", 0.1, 50.0, 0.5, 1, "N", 1)
+        1.5, Range("Grip", "Largest force with which each finger grips.", 0.1, 50.0, 0.5, 1, "N", 1)
     )
     operator_reach_x: float = _reach("x")
     operator_reach_y: float = _reach("y")
