@@ -79,7 +79,8 @@ def run(
         A recording or a scene to play, a calibration of the sensor, or a mesh as the object.
     source
         `sim:`, `sim:SCENE`, `replay:FILE`, `feed:NAME`, or a port or URL for pyserial; of a hand
-        NAME=SOURCE for each finger.
+        NAME=SOURCE for each finger. `engine:HOST` is what `kappaskin serve` runs in another room;
+        its token is in KAPPASKIN_TOKEN, or asked for.
     seconds
         Close after this many seconds; the window opens with the default theme and layout.
     screenshot

@@ -336,10 +336,13 @@ class Session(QObject):
         self._history.change(f"Play {written.file.stem}", -1, written=written)
         self._play()
 
-    def begin_fingers(self, sources: Mapping[str, str]) -> None:
-        """Begin with the `sources` of a hand, which its engines read already."""
+    def begin_fingers(self, sources: Mapping[str, str], settings: Mapping[str, Settings]) -> None:
+        """Begin with the `sources` of a hand, which its engines read already.
+
+        And with the `settings` of those that are in use.
+        """
         self._others = {
-            finger: (source, settings_for(source, self._trusts(source)))
+            finger: (source, settings.get(finger) or settings_for(source, self._trusts(source)))
             for finger, source in sources.items()
             if finger != self.finger
         }
