@@ -325,5 +325,5 @@ class Newest(QObject):
 
 
 def open_another_window(*arguments: str) -> None:
-    """Start the app again with these `arguments`, as a program of its own that outlives this one."""
+    """Start the app again with these `arguments`, as a program that outlives this one."""
     QProcess.startDetached(sys.executable, ["-m", "kappaskin", "app", *arguments])
