@@ -6,6 +6,7 @@ from kappaskin.hand.description import HANDS as HANDS
 from kappaskin.hand.description import SCHEME as SCHEME
 from kappaskin.hand.description import Finger as Finger
 from kappaskin.hand.description import HandDescription as HandDescription
+from kappaskin.hand.description import JointReceiver as JointReceiver
 from kappaskin.hand.description import Linkage as Linkage
 from kappaskin.hand.description import angles_from_json as angles_from_json
 from kappaskin.hand.description import hand_file as hand_file
