@@ -26,9 +26,10 @@ ASKS = {
     "compare": ["compare"],
     "foxglove": ["publish", "sim:", "--seconds", "30", "--foxglove", "127.0.0.1:8765"],
 }
-"""What asks for each extra but `film` and `parquet`, which need more than words.
+"""What asks for each extra but `film`, `gamepad` and `parquet`, which need more than words.
 
-They are in app/features/export/test_exports.py and core/recording/test_importing.py.
+They are in app/features/export/test_exports.py, core/hand/test_gamepad.py and
+core/recording/test_importing.py.
 """
 
 BARRED = """
@@ -82,7 +83,7 @@ def without(barred: set[str], code: str, folder: Path, *arguments: str) -> str:
 
 
 def test_every_extra_is_tried_here():
-    assert set(EXTRAS) - DEVELOPERS == {*ASKS, "film", "parquet"}
+    assert set(EXTRAS) - DEVELOPERS == {*ASKS, "film", "gamepad", "parquet"}
 
 
 @pytest.mark.full

@@ -35,7 +35,7 @@ from PySide6.QtWidgets import (
 
 from kappaskin.live import Status
 from kappaskin_app.shell.panel import CornerButton, Panel
-from kappaskin_app.shell.settings import Look, Settings, form_field
+from kappaskin_app.shell.settings import LastingSettings, Settings, form_field
 from kappaskin_app.shell.settings.form_fields import Choice, FormField, Range, Several, Switch, Text
 from kappaskin_app.widgets.parts import Label
 
@@ -347,7 +347,7 @@ class Form(Panel):
         self.reset = CornerButton(text="Reset")  # pyright: ignore[reportCallIssue]
         self.reset.setAccessibleName(f"Reset {title}")
         self.reset.setToolTip("Reset the settings of this panel; Ctrl+Z undoes it.")
-        self._undoable = tuple(name for name in names if not hasattr(Look, name))
+        self._undoable = tuple(name for name in names if not hasattr(LastingSettings, name))
         self.reset.clicked.connect(lambda: self.reset_wanted.emit(title, self._undoable))
         self.reset.hide()
         self._corner.insertWidget(0, self.reset)

@@ -1,4 +1,4 @@
-"""The history of the settings: every change but of the look is an undoable command."""
+"""The history of the settings: every change but of the lasting ones is an undoable command."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -9,11 +9,11 @@ from typing import Any, TypeVar
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtGui import QUndoCommand, QUndoStack
 
-from kappaskin_app.shell.settings import SHARED, Look, Settings, change_text
+from kappaskin_app.shell.settings import SHARED, LastingSettings, Settings, change_text
 
 _IN_A_ROW = 1.0  # s from one change of a setting to the next
 _MOST = 500  # steps that can be undone: a scene's text may be a megabyte
-_LOOK = {field.name for field in fields(Look)}
+_LASTING = {field.name for field in fields(LastingSettings)}
 _Some = TypeVar("_Some")
 _Pair = tuple[Settings, Mapping[str, Settings]]
 Description = Callable[[_Some, _Some], str]
@@ -66,9 +66,9 @@ def _description_of_pair(
 class History(QObject):
     """Holds the `settings`; `changed` reports new ones.
 
-    What is undone or redone leaves the look of the window as it is. Of a hand it has the settings
-    of the `others`, the fingers that are not shown; `others_changed` reports new ones. While
-    `of_all`, what is requested is of all fingers.
+    What is undone or redone leaves the look of the window and the operator's settings as they are.
+    Of a hand it has the settings of the `others`, the fingers that are not shown; `others_changed`
+    reports new ones. While `of_all`, what is requested is of all fingers.
     """
 
     changed = Signal(Settings)
@@ -127,9 +127,9 @@ class History(QObject):
         values: dict[str, Any],
         of_all: bool = False,
     ) -> None:
-        look = {name: values.pop(name) for name in _LOOK & values.keys()}
-        if (dressed := replace(self.settings, **look)) != self.settings:
-            self._take(dressed)
+        lasting = {name: values.pop(name) for name in _LASTING & values.keys()}
+        if (changed := replace(self.settings, **lasting)) != self.settings:
+            self._take(changed)
         before, others = (self.settings, self.others), self.others
         if of_all:
             shared = {name: value for name, value in values.items() if name in SHARED}
@@ -162,8 +162,8 @@ class History(QObject):
             self.others_changed.emit(before)
 
     def apply(self, settings: Settings) -> None:
-        """For commands only: make `settings` the present ones, except for the look."""
-        self._take(replace(settings, **{name: getattr(self.settings, name) for name in _LOOK}))
+        """For commands only: make `settings` the present ones, except for the lasting ones."""
+        self._take(replace(settings, **{name: getattr(self.settings, name) for name in _LASTING}))
 
     def _take(self, settings: Settings) -> None:
         self._requested = ""  # an undo or redo ends a row of requests

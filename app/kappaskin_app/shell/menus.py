@@ -43,8 +43,8 @@ class UndoActions(QObject):
 
 _FIND = "Find commands, settings, scenes, panels and files by a few letters"
 _RESET = (
-    "All settings to their defaults, except calibration, tare, publishing and the look of the "
-    "window"
+    "All settings to their defaults, except calibration, tare, publishing, the operator's and the "
+    "look of the window"
 )
 _PAUSE = "Pause or continue a scene or a recording; a sensor is not paused"
 _THEME = "Switch between the light and the dark theme"

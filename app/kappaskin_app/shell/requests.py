@@ -6,7 +6,7 @@ from typing import Any
 
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.session import Session
-from kappaskin_app.shell.settings import Look, Settings, locking
+from kappaskin_app.shell.settings import LastingSettings, Settings, locking
 from kappaskin_app.shell.settings.publishing import PublishSettings
 from kappaskin_app.shell.simulation import with_consequences
 
@@ -33,10 +33,10 @@ class Requests:
         self.set("theme", "light" if self._history.settings.theme == "dark" else "dark")
 
     def reset(self) -> None:
-        """Reset all settings except calibration, tare, publishing and the look of the window."""
+        """Reset all settings except calibration, tare, publishing and lasting ones."""
         now = self._history.settings
         rest = Settings(calibration=now.calibration, tare=now.tare)
-        kept = (field.name for kind in (PublishSettings, Look) for field in fields(kind))
+        kept = (field.name for kind in (PublishSettings, LastingSettings) for field in fields(kind))
         values = {name: getattr(now, name) for name in kept}
         self._history.reset("Reset settings", **vars(rest) | values)
 

@@ -313,8 +313,8 @@ _READ = 0.1  # s
 def listen(*, udp: Whole = 9870, seconds: float = math.inf, json: Switch = False) -> int:
     """Print the messages received on a UDP port of this machine, until stopped (Ctrl+C).
 
-    Contacts (ten a second) with their standard deviations and their age when sent, every loss on
-    the network, the state of the source, and a summary. Exit code 1 if no contact came.
+    Contacts (ten a second) with their standard deviations and their age when sent, haptic cues,
+    every loss on the network, the state of the source, and a summary. Exit code 1 if none came.
 
     Example: `kappaskin listen --udp 9870`
 

@@ -21,6 +21,7 @@ import numpy as np
 
 from kappaskin._processes import end_with_parent, starting_process
 from kappaskin.errors import Refusal
+from kappaskin.hand.gamepad import Gamepad
 from kappaskin.hand.operation import (
     FOLLOWING,
     OFF,
@@ -49,14 +50,17 @@ _MOST_WAITING = 4  # requests without an answer: more would fill the pipe
 class OperatorSettings:
     """What an operator is allowed and where targets come from and go.
 
-    Targets come by UDP to the address `listen`, `HOST:PORT`; from the window where that is empty.
-    They are sent to `robot`, `HOST:PORT`, unless that is empty.
+    Targets come by UDP to the address `listen`, `HOST:PORT`, or where that is empty from a
+    `gamepad`, or else from the window. They are sent to `robot`, `HOST:PORT`, unless that is empty.
+    A gamepad rumbles with a share `rumble` of the strongest.
     """
 
     limits: OperatorLimits = field(default_factory=OperatorLimits)
     enabled: bool = False
     listen: str = ""
+    gamepad: bool = False
     robot: str = ""
+    rumble: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -64,8 +68,9 @@ class OperatorStatus:
     """The present `target`, and whether it is followed or why it is not (`state`).
 
     `received`, `late` and `refused` count messages that came by UDP, `sent` and `dropped` those to
-    the robot; `refusal` says why the last one was refused, `trouble` what is wrong with the
-    addresses. `latency` is the 99th percentile in s from the arrival of a target until it was sent.
+    the robot; `refusal` says why the last one was refused, `trouble` what is wrong with the gamepad
+    or an address. `latency` is the 99th percentile in s from the arrival of a target until it was
+    sent.
     """
 
     target: HandTarget
@@ -139,13 +144,20 @@ class _Socket:
 class OperatorLoop:
     """Takes targets, follows them within limits, and sends them on; begins at `start`."""
 
-    def __init__(self, start: HandTarget, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self,
+        start: HandTarget,
+        clock: Callable[[], float] = time.monotonic,
+        gamepad: Callable[[], Gamepad] = Gamepad,
+    ) -> None:
+        self._gamepad: Gamepad | None = None
+        self._new_gamepad = gamepad
         self._clock, self._settings = clock, OperatorSettings()
         self._filter = TargetFilter(self._settings.limits, replace(start, time=clock()))
         self._receiver = TargetReceiver()
         self._in, self._out = _Socket(listens=True), _Socket(listens=False)
         self._wanted: HandTarget | None = None
-        self._wanted_at = -math.inf
+        self._wanted_at = self._heard = -math.inf
         self._session, self._sequence = secrets.randbelow(2**31), 0
         self._sent = self._dropped = 0
         self._unsent, self._dropped_at = "", -math.inf
@@ -159,17 +171,27 @@ class OperatorLoop:
         """
         if settings.listen != self._settings.listen:
             self._receiver = TargetReceiver()
-        self._settings, self._wanted, self._wanted_at = settings, wanted, self._clock()
+        self._settings, self._heard = settings, self._clock()
         self._filter.limits = settings.limits
-        if wanted is not None and not settings.listen:
-            self._arrived = wanted.time
+        if not settings.gamepad:
+            self._wanted, self._wanted_at = wanted, self._heard
+            if wanted is not None and not settings.listen:
+                self._arrived = wanted.time
+        if settings.gamepad != (self._gamepad is not None):
+            self._change_gamepad()
         return self.status
+
+    def _change_gamepad(self) -> None:
+        if self._gamepad is not None:
+            self._gamepad.close()
+        self._gamepad = self._new_gamepad() if self._settings.gamepad else None
 
     @property
     def status(self) -> OperatorStatus:
         receiver, now = self._receiver, self._clock()
         unsent = self._unsent if now - self._dropped_at < _AGAIN else ""
-        troubles = (self._in.trouble, self._out.trouble, unsent)
+        device = "" if self._gamepad is None else self._gamepad.trouble
+        troubles = (device, self._in.trouble, self._out.trouble, unsent)
         latencies = self._latencies
         return OperatorStatus(
             self._filter.target,
@@ -197,7 +219,7 @@ class OperatorLoop:
         """For how long in s nothing is due."""
         if not math.isnan(self._arrived):
             return max(0.0, self._last + _LEAST - self._clock())
-        active = self._settings.enabled or self._settings.robot
+        active = self._settings.enabled or self._settings.robot or self._settings.gamepad
         return max(0.0, self._last + (_EVERY if active else _IDLE) - self._clock())
 
     def step(self) -> None:
@@ -206,11 +228,22 @@ class OperatorLoop:
         if self.due() > 0:
             return
         now = self._last = self._clock()
+        if self._gamepad is not None and not self._settings.listen:
+            self._feel(self._gamepad, now)
         following = self._state(now) == FOLLOWING
         wanted = self._receiver.wanted(now) if self._settings.listen else self._wanted
         self._filter.follow(wanted if following else None, now)
         self._send(now, following)
         self._arrived = math.nan
+
+    def _feel(self, gamepad: Gamepad, now: float) -> None:
+        """Take the target of the gamepad, and let it rumble while the window says how much."""
+        target = self._filter.target
+        wanted = gamepad.wanted(target, self._settings.limits, now - target.time)
+        self._wanted, self._wanted_at = wanted, now
+        gamepad.rumble(self._settings.rumble if now - self._heard <= STALE else 0.0)
+        if wanted is not None:
+            self._arrived = now
 
     def _receive(self) -> None:
         for there in self.sockets():
@@ -243,6 +276,8 @@ class OperatorLoop:
         now = self._clock()
         self._filter.follow(None, now)
         self._send(now, following=False)
+        self._settings = OperatorSettings()
+        self._change_gamepad()
         self._in.close()
         self._out.close()
 

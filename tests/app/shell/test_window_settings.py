@@ -16,7 +16,7 @@ from PySide6.QtWidgets import (
 )
 
 from kappaskin_app.shell.form import Form
-from kappaskin_app.shell.settings import Look, Settings
+from kappaskin_app.shell.settings import LastingSettings, Settings
 from kappaskin_app.shell.settings.scene import SHAPES
 from kappaskin_app.shell.window import MainWindow
 
@@ -186,7 +186,7 @@ def test_every_control_obeys_the_keyboard_and_can_be_undone_and_redone(
                 now = window.history.settings
                 assert now != was, editor.objectName()
                 obeyed.add(editor.objectName())
-                if hasattr(Look, editor.objectName()):  # which undo leaves
+                if hasattr(LastingSettings, editor.objectName()):  # which undo leaves
                     assert window.history.stack.index() == index
                     window.requests.set(editor.objectName(), getattr(was, editor.objectName()))
                     continue

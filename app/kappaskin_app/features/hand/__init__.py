@@ -25,7 +25,6 @@ from kappaskin_app.shell.opening import Kind
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.window import MainWindow
 from kappaskin_app.theme import FAINT, follow_look
-from kappaskin_app.widgets.colour_bar import ColourBar
 from kappaskin_app.widgets.layout import Flow
 from kappaskin_app.widgets.line import Line
 from kappaskin_app.widgets.parts import Label, sentence, text_label
@@ -41,7 +40,8 @@ _EVERY = 100  # ms between two pictures of the maps
 _MM = 1e3
 _LEAST = 0.01  # mm, of the scale
 _PERIOD = 0.3  # s between two recognitions of what is held
-_WIDEST = "(00.00, 00.00) \N{PLUS-MINUS SIGN} 0.00 mm"
+_APART = 12  # px between two fingers
+_WIDEST = "(00.00, 00.00) \N{PLUS-MINUS SIGN} 0.000 mm"
 _HELD = "Held"
 _TEXTS = {
     _HELD: "Plane, sphere, cylinder or edge that fits the places and normals of all contacts, with "
@@ -64,7 +64,7 @@ class FingerView(QWidget):
         self.button.setToolTip(f"Show {finger} in the window, with its settings")
         self.map = SurfaceMap(finger, "mm", _TIP)
         self.map.title.hide()
-        self.map.bar.hide()
+        self.tint, self._scale = Tint("sequential", (0.0, _LEAST), "mm"), SteadyRange(_LEAST)
         self.force, self.place = Line(), Line()
         self.force.setToolTip("Normal force of the contact, with its error bar")
         self.place.setToolTip(
@@ -87,21 +87,23 @@ class FingerView(QWidget):
         if event.button() == Qt.MouseButton.LeftButton:
             self.button.click()
 
-    def show_finger(self, seen: "SeenFinger", tint: Tint) -> None:
-        """Show the newest estimate in the colours of `tint`, and the state of the source."""
+    def show_finger(self, seen: "SeenFinger", now: float) -> None:
+        """Show the newest estimate at the time `now` in s, and the state of the source."""
         estimate, sensor = seen.estimate, seen.status.sensor
         self.map.words.show_text(seen.state)
         if estimate is None or sensor is None:
             nowhere = np.full(2, np.nan)
-            self.map.show_surface(None, tint.limits, tint.part, nowhere, (1.0, 1.0))
+            self.map.show_surface(None, (0.0, 1.0), "sequential", nowhere, (1.0, 1.0))
             self.force.show_text(NONE)
             self.place.show_text(NONE)
             return
         patch, contact = sensor.layout.patch, estimate.contact
-        sides = patch.a, patch.b
-        self.map.show_surface(
-            _MM * estimate.surface, tint.limits, tint.part, contact.position, sides
-        )
+        values, sides = _MM * estimate.surface, (patch.a, patch.b)
+        limit = self._scale.follow(largest(values), now)
+        self.tint = Tint("sequential", (0.0, limit), "mm")
+        if largest(np.minimum(values, 0.0)) > largest(np.maximum(values, 0.0)):
+            self.tint = Tint("pulled", (-limit, 0.0), "mm")
+        self.map.show_surface(values, self.tint.limits, self.tint.part, contact.position, sides)
         self.map.map.show_faded(seen.old)
         off = Coverage.now.of(contact.force_sd, contact.force_95)
         force = contact.no_force.partition(":")[0] or with_error(contact.force, off, "N")
@@ -141,8 +143,7 @@ class HandPanel(QWidget):
     def __init__(self, session: Session, tasks: Tasks) -> None:
         super().__init__()
         self._session, self._next = session, 0.0
-        self.views, self._scale = dict[str, FingerView](), SteadyRange(_LEAST)
-        self.hand_view, self.bar = HandView(), ColourBar()
+        self.views, self.hand_view = dict[str, FingerView](), HandView()
         self.hand_view.hide()
         self.hand_view.clicked.connect(guarded(self._choose))
         self.recognition = GraspRecognition(tasks, self)
@@ -150,6 +151,7 @@ class HandPanel(QWidget):
         self.held: HeldObject | None = None
         buttons = QButtonGroup(self)
         row, column = QHBoxLayout(), QVBoxLayout(self)
+        row.setSpacing(_APART)
         column.setSpacing(2)
         column.addLayout(row, 1)
         row.addWidget(self.hand_view, 2)
@@ -160,7 +162,6 @@ class HandPanel(QWidget):
                 guarded(lambda on, finger=finger: on and self.chosen.emit(finger))
             )
             row.addWidget(view, 1)
-        row.addWidget(self.bar)
         self.texts = {name: Line() for name in _TEXTS}
         for name, line in self.texts.items():
             line.setToolTip(_TEXTS[name])
@@ -189,21 +190,11 @@ class HandPanel(QWidget):
             paused = not session.fingers.engines[finger].requested.speed
             state = state_of(status, estimate and estimate.host_time, now, paused=paused)
             seen[finger] = SeenFinger(status, estimate, state)
-        tint = self._tint([each.estimate for each in seen.values() if each.estimate], now)
-        self.bar.show_tint(tint)
         for finger, each in seen.items():
-            self.views[finger].show_finger(each, tint)
-        self._show_hand(seen, tint, now)
+            self.views[finger].show_finger(each, now)
+        self._show_hand(seen, now)
 
-    def _tint(self, estimates: list[Estimate], now: float) -> Tint:
-        """The colours of the displacements of all fingers, in mm."""
-        values = np.concatenate([np.zeros(1), *(_MM * each.surface.ravel() for each in estimates)])
-        limit = self._scale.follow(largest(values), now)
-        if largest(np.minimum(values, 0.0)) > largest(np.maximum(values, 0.0)):
-            return Tint("pulled", (-limit, 0.0), "mm")
-        return Tint("sequential", (0.0, limit), "mm")
-
-    def _show_hand(self, seen: Mapping[str, SeenFinger], tint: Tint, now: float) -> None:
+    def _show_hand(self, seen: Mapping[str, SeenFinger], now: float) -> None:
         """Draw the hand where it is known where its fingers are, else say how it is."""
         hand, why = self._session.hand, _UNDESCRIBED
         placements: Mapping[str, Placement] = {}
@@ -223,7 +214,11 @@ class HandPanel(QWidget):
         }
         drawn = {
             name: ShownFinger(
-                one.where, one.status.sensor.layout.patch, one.estimate, seen[name].old
+                one.where,
+                one.status.sensor.layout.patch,
+                one.estimate,
+                self.views[name].tint,
+                seen[name].old,
             )
             for name, one in there.items()
             if one.status.sensor is not None
@@ -231,7 +226,7 @@ class HandPanel(QWidget):
         if now >= self._next:
             self._next = now + _PERIOD
             self.recognition.start([one for name, one in there.items() if not seen[name].old])
-        self.hand_view.show_hand(drawn, tint, self.held)
+        self.hand_view.show_hand(drawn, self.held)
 
     def _show_grasp(self, grasp: Grasp, held: HeldObject) -> None:
         self.held = held

@@ -70,11 +70,12 @@ _ABOUT = (
 
 @dataclass(frozen=True, eq=False)
 class ShownFinger:
-    """A finger: where its `patch` is, its newest estimate, and whether that is old."""
+    """A finger: where its `patch` is, its newest estimate, its colours in mm, whether it is old."""
 
     where: Placement
     patch: Patch
     estimate: Estimate
+    tint: Tint
     faded: bool
 
 
@@ -121,7 +122,7 @@ class _DrawnFinger:
         self.behind: Array = middle[0] - 0.9 * self.skin.size * out[0]
         """Where its name is, below the skin."""
 
-    def show(self, finger: ShownFinger, tint: Tint, size: float, longest: float) -> None:
+    def show(self, finger: ShownFinger, size: float, longest: float) -> None:
         """Draw it on a hand so large in mm, whose arrows of `longest` N are the longest."""
         estimate, contact = finger.estimate, finger.estimate.contact
         (by_y, by_x), where = self.strides, finger.where
@@ -129,7 +130,7 @@ class _DrawnFinger:
         self.skin.show_displacement(surface)
         self._mesh.points[:] = self.skin.points()
         self._mesh.point_data.active_normals[:] = self.skin.shading()
-        colours = tint.rgb(MM * np.nan_to_num(surface), current().missing)
+        colours = finger.tint.rgb(MM * np.nan_to_num(surface), current().missing)
         self._mesh.point_data["rgb"][:] = colours.reshape(-1, 3)
         self._mesh.Modified()
         self.where = _matrix(where.rotation, MM * where.position)
@@ -231,10 +232,8 @@ class HandView(QWidget):
         self._chosen = finger
         self.update()
 
-    def show_hand(
-        self, fingers: Mapping[str, ShownFinger], tint: Tint, held: HeldObject | None
-    ) -> None:
-        """Draw the `fingers` in the colours of `tint`, in mm, and what is held, if it is time."""
+    def show_hand(self, fingers: Mapping[str, ShownFinger], held: HeldObject | None) -> None:
+        """Draw the `fingers` and what is held, if it is time."""
         now = time.monotonic()
         if not fingers or now < self.due or self.width() < 2 or self.height() < 2:
             return
@@ -244,7 +243,7 @@ class HandView(QWidget):
         forces = [abs(each.estimate.contact.force) for each in fingers.values() if not each.faded]
         longest = self._arrows.follow(max(filter(math.isfinite, forces), default=0.0), now)
         for name, each in fingers.items():
-            self.fingers[name].show(each, tint, self._size, longest)
+            self.fingers[name].show(each, self._size, longest)
         self.held.show(held, self._size)
         self._draw()
         took = time.monotonic() - now

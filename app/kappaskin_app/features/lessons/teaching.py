@@ -1,12 +1,13 @@
 """Teaching: the lesson in progress, its steps as undoable settings, its answers judged."""
 
+import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import QObject, QProcess, Signal
 from PySide6.QtGui import QPixmap
 from PySide6.QtWidgets import QFileDialog, QWidget
 
@@ -115,8 +116,14 @@ class Teaching(QObject):
         self.take(str(file))
 
     def take(self, file: str) -> None:
-        """Start the lesson in `file`, or continue it."""
+        """Start the lesson in `file`, or continue it; one on a hand in a window on that hand."""
         progress = self.taken[file]
+        if (hand := progress.lesson.hand) and not self._session.source.startswith(f"hand:{hand}#"):
+            QProcess.startDetached(
+                sys.executable, ["-m", "kappaskin", "app", file, "--source", f"hand:{hand}"]
+            )
+            self.notified.emit(f"{progress.lesson.title}: it opens in a window of its hand.")
+            return
         self._go(progress, 0 if progress.at_end else progress.step)
 
     def leave(self) -> None:
@@ -171,7 +178,8 @@ class Teaching(QObject):
         self.pointed.emit(progress.lesson.steps[place.step].point if progress and at_work else ())
         self.changed.emit()
         if left and progress is not None:
-            self._simulate()
+            if not progress.lesson.hand:
+                self._simulate()
             self.taken_up.emit()
 
     def answer(self, given: str) -> None:

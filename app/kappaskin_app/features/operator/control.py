@@ -1,9 +1,8 @@
-"""Operator control: from an input device to the operator's process and the simulated hand."""
+"""Operator control: from the pad and the settings to the operator's process."""
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
-from typing import Protocol
 
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
 
@@ -16,27 +15,14 @@ from kappaskin.hand import (
     OperatorStatus,
     TargetFilter,
 )
+from kappaskin_app.features.operator.pad import Pad
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.settings import Settings
-from kappaskin_app.shell.settings.operation import UDP
+from kappaskin_app.shell.settings.operation import GAMEPAD, PAD, UDP
 
 _EVERY = 8  # ms between two targets
 _SHOWN = 5  # of them between two reports
-_GRIPS = 0.5  # s for which a grip that is set is followed
-
-
-class InputDevice(Protocol):
-    """What moves the hand; `trouble` says why it does not."""
-
-    @property
-    def trouble(self) -> str: ...
-
-    def wanted(
-        self, target: HandTarget, limits: OperatorLimits, seconds: float
-    ) -> HandTarget | None:
-        """Where it wants the hand after `seconds`, from `target`; None to hold still."""
-        ...
 
 
 def limits_of(settings: Settings) -> OperatorLimits:
@@ -50,7 +36,7 @@ def limits_of(settings: Settings) -> OperatorLimits:
 
 
 class OperatorControl(QObject):
-    """Follows the input while it is `enabled`; off at first.
+    """Follows the input while it is `enabled`; off at first, and at `start`.
 
     `reported` brings the status, about 25 times a second; `switched` whether it is enabled;
     `refused` why the process does not run, `ended` that it has ended. `followers` get each target
@@ -62,15 +48,17 @@ class OperatorControl(QObject):
     refused = Signal(str)
     ended = Signal()
 
-    def __init__(self, history: History, devices: Mapping[str, InputDevice]) -> None:
+    def __init__(self, history: History, pad: Pad, start: Callable[[], HandTarget]) -> None:
         super().__init__()
-        self._history, self._devices = history, devices
+        self._history, self._pad, self._start = history, pad, start
         self.followers: list[Callable[[HandTarget], object]] = []
         self.enabled = self._visible = False
         self.status = OperatorStatus(HandTarget())
         self._filter = TargetFilter(limits_of(history.settings), HandTarget())
         self.link: OperatorLink | None = None
-        self._grip, self._grip_until = 0.0, 0.0
+        self._grip: float | None = None
+        self.rumble = 0.0
+        """How strongly a gamepad rumbles, as a share of the strongest."""
         self._input, self._ticks = history.settings.operator_input, 0
         self._timer = QTimer(self, interval=_EVERY, timerType=Qt.TimerType.PreciseTimer)  # pyright: ignore[reportCallIssue]
         self._timer.timeout.connect(guarded(self._tick))
@@ -85,6 +73,8 @@ class OperatorControl(QObject):
 
     def _begin(self) -> None:
         try:
+            if not self.status.target.time:
+                self.status = OperatorStatus(self._start())
             self.link = self.link or OperatorLink(self.status.target)
             self._timer.start()
         except Refusal as refusal:
@@ -95,14 +85,14 @@ class OperatorControl(QObject):
         if on:
             self._begin()
         if (on := on and self.link is not None) != self.enabled:
-            self.enabled = on
+            self.enabled, self._grip = on, None
             self.switched.emit(on)
             self.set_visible(self._visible)
 
     def set_grip(self, share: float) -> None:
         """Grip with a `share` of the largest force."""
-        self._grip = share * self._filter.limits.grip
-        self._grip_until = time.monotonic() + _GRIPS
+        if self.enabled:
+            self._grip = share * self._filter.limits.grip
 
     def _tick(self) -> None:
         settings = self._history.settings
@@ -123,16 +113,19 @@ class OperatorControl(QObject):
         """Request that the input is followed, and take the status."""
         if self.link is None:
             return
-        by_udp, now = self._input == UDP, time.monotonic()
+        now = time.monotonic()
         self._filter.limits = limits
-        wanted = None if by_udp or not self.enabled else self._wanted(limits, now)
+        pad = self.enabled and self._input == PAD
+        wanted = self._wanted(limits, now) if pad else None
         if wanted is None:
             self._filter.target = replace(self.status.target, time=now)
         request = OperatorSettings(
             limits,
             self.enabled,
-            settings.operator_listens if by_udp else "",
+            settings.operator_listens if self._input == UDP else "",
+            self._input == GAMEPAD,
             settings.robot_at if settings.send_to_robot else "",
+            self.rumble,
         )
         was = self.status.target
         self.status = self.link.request(request, wanted and self._filter.follow(wanted, now))
@@ -146,18 +139,14 @@ class OperatorControl(QObject):
                 follow(target)
 
     def _wanted(self, limits: OperatorLimits, now: float) -> HandTarget | None:
-        """What the device wants, with the grip that is set."""
+        """What the pad wants, with the grip that is set."""
         at = self._filter.target
-        wanted = self._devices[self._input].wanted(at, limits, now - at.time)
-        if now < self._grip_until:
-            wanted = replace(wanted or at, grip=self._grip)
+        wanted = self._pad.wanted(at, limits, now - at.time)
+        if self._grip is not None:
+            wanted = replace(wanted or at, grip=min(self._grip, limits.grip))
+            if wanted.grip == self.status.target.grip:
+                self._grip = None
         return wanted
-
-    @property
-    def trouble(self) -> str:
-        """Why the input does not move the hand, or the robot is not reached; empty if neither."""
-        device = self._devices.get(self._input)
-        return (device.trouble if device else "") or self.status.trouble
 
     def close(self) -> None:
         """Hold still, and end the process, until it is shown or enabled again."""

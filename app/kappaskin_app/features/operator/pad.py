@@ -1,7 +1,7 @@
 """Pad: a hand moved with mouse and keys."""
 
 import math
-import time
+from dataclasses import replace
 
 from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import (
@@ -33,7 +33,6 @@ _CLOSES = 1.0  # s from no grip to the largest
 _PER_NOTCH = 1e-3, 0.05  # m and rad, of the wheel
 _PER_PIXEL = 5e-3  # rad, of Shift and drag
 _NOTCH = 120  # of the wheel's angle
-_COASTS = 0.5  # s for which a notch of the wheel is followed, at most
 _SIDE, _DOT = 170, 6  # px
 _NONE = (0.0, 0.0, 0.0)
 _COMMANDS = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier
@@ -55,7 +54,6 @@ class Pad(QWidget):
     """
 
     stopped = Signal()
-    trouble = ""
 
     def __init__(self) -> None:
         super().__init__()
@@ -68,7 +66,7 @@ class Pad(QWidget):
         self._held = set[int]()
         self._pressed: tuple[QPointF, HandTarget] | None = None
         self._at, self._turns = QPointF(), False
-        self._rolled: tuple[float, HandTarget] | None = None
+        self._rolled: HandTarget | None = None
 
     def wanted(
         self, target: HandTarget, limits: OperatorLimits, seconds: float
@@ -76,13 +74,12 @@ class Pad(QWidget):
         """Where mouse and keys want the hand after `seconds`, from `target`; None for nowhere."""
         if self._pressed is not None:
             start, at = self._pressed
-            return self._dragged(at, self._at - start)
+            return replace(self._dragged(at, self._at - start), grip=target.grip)
         if self._held:
             return self._keyed(target, limits, seconds)
         if self._rolled is not None:
-            until, at = self._rolled
-            places = at.position, at.rotation
-            if time.monotonic() < until and places != (target.position, target.rotation):
+            at = replace(limits.nearest(self._rolled), grip=target.grip)
+            if (at.position, at.rotation) != (target.position, target.rotation):
                 return at
             self._rolled = None
         return None
@@ -163,8 +160,8 @@ class Pad(QWidget):
             start, at = self._pressed
             self._pressed = start, at.moved(*by, 0.0)
         else:
-            before = self._rolled[1] if self._rolled else self._target
-            self._rolled = time.monotonic() + _COASTS, before.moved(*by, 0.0)
+            before = self._rolled or self._target
+            self._rolled = self._limits.nearest(before.moved(*by, 0.0))
         event.accept()
 
     def focusOutEvent(self, event: QFocusEvent) -> None:

@@ -31,6 +31,7 @@ _NAMES = (
     "send_to_robot",
     "robot_at",
     "operator_tones",
+    "operator_rumble",
     "felt_at_most",
 )
 _LETTERS = 1.5  # times as large is the state
@@ -69,6 +70,8 @@ class OperatorForm(Form):
         super().show_settings(settings)
         self.form.setRowVisible(self.editor("operator_listens"), settings.operator_input == UDP)
         self.form.setRowVisible(self.editor("robot_at"), settings.send_to_robot)
+        rumbles = settings.operator_input == GAMEPAD
+        self.form.setRowVisible(self.editor("operator_rumble"), rumbles)
 
 
 class OperatorPanel(QWidget):
@@ -98,6 +101,7 @@ class OperatorPanel(QWidget):
         self.state, self.hint, self.message = Heading(_LETTERS), text_label(), text_label()
         self.message.setForegroundRole(ALERT)
         self._settings = Settings()
+        self._hand = ""
         self._reports = deque[OperatorStatus](maxlen=_RATES)
         self.numbers = {
             name: text_label(tip=tip)
@@ -112,7 +116,7 @@ class OperatorPanel(QWidget):
         }
         self._lay_out()
         follow_look(self, self._dress)
-        self.show_status(OperatorStatus(HandTarget()), "")
+        self.show_status(OperatorStatus(HandTarget()))
 
     def _lay_out(self) -> None:
         around, numbers, column = QHBoxLayout(self), QFormLayout(), QVBoxLayout()
@@ -148,13 +152,17 @@ class OperatorPanel(QWidget):
     def show_settings(self, settings: Settings) -> None:
         self._settings = settings
         self.form.show_settings(settings)
-        self.grip.setEnabled(settings.operator_input != UDP)
+        self.grip.setEnabled(settings.operator_input == PAD)
 
     def show_enabled(self, on: bool) -> None:
         with QSignalBlocker(self.enable):
             self.enable.setChecked(on)
 
-    def show_status(self, status: OperatorStatus, trouble: str) -> None:
+    def show_hand(self, trouble: str) -> None:
+        """Show what is wrong with the simulated hand; empty if nothing is."""
+        self._hand = trouble
+
+    def show_status(self, status: OperatorStatus) -> None:
         """Show the target, the counts, and what is wrong."""
         if status.target.time:
             self._reports.append(status)
@@ -176,7 +184,9 @@ class OperatorPanel(QWidget):
             if text != self.numbers[name].text():
                 self.numbers[name].setText(text)
         refusal = f"Last refused: {status.refusal}" if status.refusal else ""
-        self.message.setText("\n".join(map(sentence, filter(None, (trouble, refusal)))))
+        self.message.setText(
+            "\n".join(map(sentence, filter(None, (status.trouble, self._hand, refusal))))
+        )
 
     def _texts(self, status: OperatorStatus) -> dict[str, str]:
         """Each number as text."""

@@ -44,18 +44,22 @@ class SceneSettings(Skin, LoadSettings, Noise, Electronics, GageEffects, OwnScen
 
 
 @dataclass(frozen=True)
+class LastingSettings(Look, OperationSettings):
+    """Settings that stay as they are in undo and redo, and when another finger is shown."""
+
+
+@dataclass(frozen=True)
 class Settings(
     SceneSettings,
     AddedNoise,
     EstimatorSettings,
     View,
     Camera,
-    Look,
+    LastingSettings,
     Scanning,
     PublishSettings,
     ComparedSettings,
     DesignSettings,
-    OperationSettings,
 ):
     """All settings, in SI units; a change is a new `Settings`.
 
@@ -85,7 +89,6 @@ _PANELS = {
     Scanning: "scan",
     PublishSettings: "publish",
     ComparedSettings: "B",
-    OperationSettings: "operation",
 }
 """Panels whose name precedes the label of their settings in the history."""
 _LONGEST = 30  # characters of a text

@@ -58,7 +58,7 @@ class OperationSettings:
         ),
     )
     operator_grip: float = setting(
-        2.0, Range("Grip", "Largest force with which each finger grips.", 0.1, 50.0, 0.5, 1, "N", 1)
+        1.5, Range("Grip", "Largest force with which each finger grips.", 0.1, 50.0, 0.5, 1, "N", 1)
     )
     operator_reach_x: float = _reach("x")
     operator_reach_y: float = _reach("y")
@@ -79,6 +79,10 @@ class OperationSettings:
             "A tone for each finger, from the left to the right: its pitch and loudness follow the "
             "force. Silent without a contact, and where data are old or lost.",
         ),
+    )
+    operator_rumble: bool = setting(
+        True,
+        Switch("Rumble", "The gamepad rumbles as strongly as the finger that feels most."),
     )
     felt_at_most: float = setting(
         1.0,

@@ -40,14 +40,14 @@ def view(qapp):
 def shown(estimate, **faded):
     patch = load_scene("centre").plate.patch
     return {
-        name: ShownFinger(where, patch, estimate, faded.get(name, False))
+        name: ShownFinger(where, patch, estimate, TINT, faded.get(name, False))
         for name, where in PLACES.items()
     }
 
 
 def draw(view, fingers, held=None):
     view.due = 0.0
-    view.show_hand(fingers, TINT, held)
+    view.show_hand(fingers, held)
 
 
 def camera(view):

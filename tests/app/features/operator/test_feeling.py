@@ -61,6 +61,7 @@ def test_tones_are_heard_while_the_operator_is_shown(shared_window, player, unti
     window.docks["operator"].hide()
     until(lambda: window.control.link is None)
     assert not window.tones.on
+    window.requests.set("operator_tones", False)
 
 
 def test_without_a_player_it_is_said_and_switched_off(shared_window, monkeypatch, tmp_path, until):

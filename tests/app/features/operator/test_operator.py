@@ -12,6 +12,7 @@ from PySide6.QtTest import QTest
 
 from kappaskin.hand import HandTarget, TargetMessage
 from kappaskin.hand.operation import decoded
+from kappaskin_app.shell.settings.operation import OperationSettings
 
 
 def free_address() -> str:
@@ -26,6 +27,7 @@ def operator(shared_window, until):
     window.docks.reveal("operator")
     until(lambda: window.control.status.target.time)
     yield window
+    window.history.change("", **vars(OperationSettings()))
     window.operator.pad.release()
     window.control.switch(False)
     window.docks["operator"].hide()
@@ -88,7 +90,7 @@ def test_the_slider_sets_the_grip(operator, until) -> None:
     panel = operator.operator
     panel.enable.click()
     panel.grip.setValue(50)
-    until(lambda: operator.control.status.target.grip == pytest.approx(1.0))
+    until(lambda: operator.control.status.target.grip == pytest.approx(0.75))
     until(lambda: operator.control.status.state == "released")
     operator.requests.set("operator_grip", 0.5)
     until(lambda: operator.control.status.target.grip == 0.5)
@@ -140,3 +142,26 @@ def test_a_process_that_dies_is_reported_and_started_again(operator, until) -> N
     panel.enable.click()
     assert panel.enable.isChecked()
     until(lambda: operator.control.status.target.time > before)
+
+
+def test_a_gamepad_that_is_missing_is_reported(operator, until) -> None:
+    operator.requests.set("operator_input", "gamepad")
+    text = operator.operator.message.text
+    until(lambda: "ip install 'kappaskin[gamepad]'" in text() or "plug one in" in text())
+
+
+def test_undo_and_another_reset_leave_the_limits(operator) -> None:
+    operator.requests.set("functions_x", 5)
+    operator.requests.set("operator_speed", 0.01)
+    operator.history.stack.undo()
+    operator.requests.reset()
+    assert operator.history.settings.operator_speed == 0.01
+
+
+def test_the_gamepad_rumbles_as_the_finger_that_feels_most(operator) -> None:
+    shared_window, feature = operator, operator.features["operator"]
+    feature.feeling.felt.emit([0.2, 0.7, 0.0])
+    assert feature.control.rumble == 0.7
+    shared_window.requests.set("operator_rumble", False)
+    feature.feeling.felt.emit([0.2, 0.7, 0.0])
+    assert feature.control.rumble == 0.0

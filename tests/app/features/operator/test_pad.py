@@ -81,6 +81,8 @@ def test_a_drag_moves_the_hand_by_as_much_of_the_workspace(pad, points_at) -> No
     points_at(pad, QPoint(120, 90))
     assert wanted(pad).position == pytest.approx((0.02, 0.005, 0.0))
     assert wanted(pad).rotation == HERE.rotation
+    gripped = HandTarget(HERE.position, grip=3.0)  # meanwhile, by the slider
+    assert pad.wanted(gripped, LIMITS, 0.01).grip == 3.0
     QTest.mouseRelease(pad, Qt.MouseButton.LeftButton, pos=QPoint(120, 90))
     assert wanted(pad) is None
 
