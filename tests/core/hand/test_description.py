@@ -161,7 +161,7 @@ def test_another_source_names_no_hand(source):
 
 
 def test_a_hand_that_is_not_ready_is_refused_with_those_that_are():
-    with pytest.raises(Refusal, match=r"a hand among .*three-fingertips.*, or a file; got 'mine'"):
+    with pytest.raises(Refusal, match=r"a hand among .*three-fingertips, or a file .*; got 'mine'"):
         named_hand("hand:mine")
 
 
