@@ -345,13 +345,19 @@ class Session(QObject):
         self._play()
 
     def begin_fingers(
-        self, sources: Mapping[str, str], hand: HandDescription | None = None
+        self,
+        sources: Mapping[str, str],
+        hand: HandDescription | None = None,
+        settings: Mapping[str, Settings] | None = None,
     ) -> None:
-        """Begin with the `sources` of a hand, which its engines read already, and what it is."""
-        self.hand = hand
+        """Begin with the `sources` of a hand, which its engines read already, and what it is.
+
+        And with the `settings` of those that are in use.
+        """
+        self.hand, used = hand, settings or {}
         self._sources = {finger: each for finger, each in sources.items() if finger != self.finger}
         self._history.others = {
-            finger: settings_for(source, self._trusts(source))
+            finger: used.get(finger) or settings_for(source, self._trusts(source))
             for finger, source in self._sources.items()
         }
 

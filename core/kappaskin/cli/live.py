@@ -166,7 +166,6 @@ def serve(
         Let the scene name files outside its folder.
     """
     from kappaskin.live import EngineServer, Fingers, place_of
-    from kappaskin.pipeline import Setup
     from kappaskin.publish import TOKEN, token_of
 
     check_time(seconds, "serve")
@@ -177,7 +176,7 @@ def serve(
     (host, port), (token, made) = place_of(listen), token_of()
     stopped = stops()
     with (
-        Fingers(fingers, Setup(quantities=("surface", "contact", "geometry"))) as hand,
+        Fingers(fingers) as hand,
         EngineServer(hand, fingers, host, port, token, recordings, trust) as server,
     ):
         hand.connect(fingers, trust)

@@ -188,6 +188,11 @@ class Engine:
         return len(self._deaths) >= _DEATHS
 
     @property
+    def engines(self) -> "dict[str, Engine]":
+        """Itself, without a name: those of a hand of one."""
+        return {"": self}
+
+    @property
     def source(self) -> str | None:
         """The source that is requested, None where there is to be none."""
         return self.requested.source

@@ -21,6 +21,7 @@ from kappaskin._text import printable
 from kappaskin.errors import Refusal, SourceError
 from kappaskin.live.codec import LARGEST, BadMessageError, decoded, encoded
 from kappaskin.live.requests import Action, Requested
+from kappaskin.sources import Source, register_scheme
 
 PORT = 9871
 """The port of an engine that listens, unless another one is given."""
@@ -302,6 +303,16 @@ def check_version(version: str, whose: str) -> None:
             f"expected the same version at both ends, got {printable(version[:20])} of {whose} and "
             f"{VERSION} here; install the same one"
         )
+
+
+def _refuse(name: str, _: bool) -> Source:
+    raise Refusal(
+        f"expected a source of readings, got the engine {name}; open `kappaskin app --source "
+        f"{SCHEME}{name}`, with no other source"
+    )
+
+
+register_scheme(SCHEME, _refuse)
 
 
 def place_text(host: str, port: int) -> str:

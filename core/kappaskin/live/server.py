@@ -363,7 +363,7 @@ class EngineServer:
         """Let another window in once no connection of the last one is left."""
         if self._owner and all(each.line is None for each in self._fingers.values()):
             self.notices.append(f"{self.window} is gone; the engine goes on")
-            self._owner = self.window = ""
+            self._owner, self.window = "", ""
 
     def close(self) -> None:
         """End all connections."""

@@ -40,6 +40,19 @@ class LinkStatus:
     shown: float = math.nan
     cuts: int = 0
 
+    @property
+    def words(self) -> str:
+        """The delay and the loss, as far as they are known."""
+        trip, age = (f"{1e3 * each:.0f} ms" for each in (self.round_trip, self.age))
+        parts = [f"{trip} there and back"] if math.isfinite(self.round_trip) else []
+        if math.isfinite(self.age):
+            parts.append(f"estimates {age} old when they come")
+        if math.isfinite(self.shown):
+            parts.append(f"{1 - self.shown:.0%} of them left out")
+        if self.cuts:
+            parts.append(f"lost {self.cuts} time{'s' if self.cuts > 1 else ''}")
+        return ", ".join(parts)
+
 
 @dataclass(frozen=True)
 class Status:

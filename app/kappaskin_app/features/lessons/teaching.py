@@ -1,13 +1,12 @@
 """Teaching: the lesson in progress, its steps as undoable settings, its answers judged."""
 
-import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from PySide6.QtCore import QObject, QProcess, Signal
+from PySide6.QtCore import QObject, Signal
 from PySide6.QtGui import QPixmap
 from PySide6.QtWidgets import QFileDialog, QWidget
 
@@ -19,7 +18,7 @@ from kappaskin_app.features.lessons.lesson_file import READY, read_lesson
 from kappaskin_app.features.lessons.progress import Progress
 from kappaskin_app.features.lessons.sheets import sheet, write_hand_out
 from kappaskin_app.guard import guarded
-from kappaskin_app.shell.background import BackgroundTask, Tasks
+from kappaskin_app.shell.background import BackgroundTask, Tasks, open_another_window
 from kappaskin_app.shell.display import Display
 from kappaskin_app.shell.folders import proposed, recordings_folder
 from kappaskin_app.shell.history import History
@@ -119,9 +118,7 @@ class Teaching(QObject):
         """Start the lesson in `file`, or continue it; one on a hand in a window on that hand."""
         progress = self.taken[file]
         if (hand := progress.lesson.hand) and not self._session.source.startswith(f"hand:{hand}#"):
-            QProcess.startDetached(
-                sys.executable, ["-m", "kappaskin", "app", file, "--source", f"hand:{hand}"]
-            )
+            open_another_window(file, "--source", f"hand:{hand}")
             self.notified.emit(f"{progress.lesson.title}: it opens in a window of its hand.")
             return
         self._go(progress, 0 if progress.at_end else progress.step)
