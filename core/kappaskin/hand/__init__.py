@@ -34,8 +34,8 @@ from kappaskin.hand.operation import TargetReceiver as TargetReceiver
 from kappaskin.hand.operator_link import OperatorLink as OperatorLink
 from kappaskin.hand.operator_link import OperatorSettings as OperatorSettings
 from kappaskin.hand.operator_link import OperatorStatus as OperatorStatus
-from kappaskin.hand.placement import Placement as Placement
-from kappaskin.hand.placement import placement as placement
+from kappaskin.hand.pose import Placement as Placement
+from kappaskin.hand.pose import placement as placement
 from kappaskin.hand.simulated_hand import FingerPress as FingerPress
 from kappaskin.hand.simulated_hand import HandCourse as HandCourse
 from kappaskin.hand.simulated_hand import HandState as HandState

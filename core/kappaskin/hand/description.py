@@ -17,7 +17,7 @@ from kappaskin._schema import Key, Part, Unit, Within
 from kappaskin._toml import TomlTable, json_table, parsed
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
-from kappaskin.hand.placement import IDENTITY, Placement, Triple, placement, rotation_about
+from kappaskin.hand.pose import IDENTITY, Placement, Triple, placement, rotation_about
 from kappaskin.hand.simulated_hand import (
     SHAPES,
     HandCourse,
