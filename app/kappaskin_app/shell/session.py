@@ -17,7 +17,7 @@ from kappaskin.errors import Refusal
 from kappaskin.estimation import Region, ScanTradeoff
 from kappaskin.frames import Estimate
 from kappaskin.hand import HandDescription
-from kappaskin.live import STREAMING, Engine, Fingers, ResumeInfo, Status
+from kappaskin.live import STREAMING, Engine, Fingers, RemoteFingers, ResumeInfo, Status
 from kappaskin.mechanics import Plate, PointLoad
 from kappaskin.pipeline import Setup
 from kappaskin.publish import of_finger
@@ -625,10 +625,12 @@ class Session(QObject):
     def record(self, path: Path | None) -> None:
         """Record to `path` from now on, a hand with all its fingers; None ends that.
 
-        The recorder of a hand is started in the background.
+        The recorder of a hand is started in the background; that of one in another room is there.
         """
         if self.fingers is None:
             self.engine.record(path)
+        elif path is not None and isinstance(self.fingers, RemoteFingers):
+            self.fingers.record(path)
         elif path is not None and not self._recorder.running:
             self._records = True
             self._recorder.run(HandRecorder, path.absolute(), tuple(self.fingers.engines))

@@ -46,7 +46,7 @@ from kappaskin.live.requests import SETTINGS, Action, Requested, Seek, Update
 from kappaskin.live.resume import ResumeInfo
 from kappaskin.live.ring import Ring, is_slot
 from kappaskin.live.status import LOST, WAITING, LinkStatus, Status
-from kappaskin.recording import RecordingStatus
+from kappaskin.recording import HandRecorder, RecordingStatus
 
 _FIRST = 5.0  # s within which an engine has to answer at first
 _AGAIN = 0.7, 3.0  # s within which it has to again, where the way is short, or where it is not
@@ -436,8 +436,9 @@ class RemoteFingers(Fingers):
         """Any: one file has all fingers."""
         return next(iter(self.engines.values()))
 
-    def record(self, path: Path) -> None:
-        self._first.record(path)
+    def record(self, to: Path | HandRecorder) -> None:
+        """Record to a path at the engines, which have a recorder of their own."""
+        self._first.record(to if isinstance(to, Path) else to.path)
 
     def stop_recording(self) -> None:
         self._first.record(None)

@@ -208,7 +208,8 @@ class EngineServer:
             name: _Finger(engine, sources[name], trust) for name, engine in hand.engines.items()
         }
         self._new = dict[MessageSocket, tuple[float, bytes]]()
-        self._owner, self.window, self._since = "", "", 0.0
+        self._owner: str = ""
+        self.window, self._since = "", 0.0
         self._name: Path | None = None
         self.taken_over, self.notices = False, list[str]()
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
