@@ -35,6 +35,7 @@ from kappaskin.live.codec import encoded
 from kappaskin.live.link import Answer, Change, Denied, EngineAddress, Greeting, MessageSocket
 from kappaskin.recording import Recording, Verification
 from kappaskin.recording.recompute import RecordedFrames
+from kappaskin.sources import open_source
 
 pytestmark = pytest.mark.slow
 
@@ -396,6 +397,11 @@ def test_places_have_a_host_and_a_port(text: str, place: tuple[str, int]) -> Non
 def test_other_places_are_refused(text: str) -> None:
     with pytest.raises(Refusal):
         place_of(text)
+
+
+def test_an_engine_is_no_source_of_readings() -> None:
+    with pytest.raises(Refusal, match="kappaskin app --source engine:lab"):
+        open_source("engine:lab")
 
 
 def test_without_an_engine_there_the_refusal_says_what_to_start() -> None:
