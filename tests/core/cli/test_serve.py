@@ -12,6 +12,7 @@ import pytest
 
 from kappaskin.cli import REFUSED, main
 from kappaskin.live import STREAMING, RemoteFingers, remote_engines
+from kappaskin.publish.access import _token
 
 pytestmark = pytest.mark.slow
 
@@ -65,12 +66,10 @@ def test_what_cannot_be_served_is_refused(arguments, said, capsys, monkeypatch, 
 
 
 def test_a_short_token_is_refused(capsys, monkeypatch) -> None:
-    from kappaskin.publish import access
-
-    access._token.cache_clear()
+    _token.cache_clear()
     monkeypatch.setenv("KAPPASKIN_TOKEN", "short")
     try:
         assert main(["serve", "sim:"]) == REFUSED
     finally:
-        access._token.cache_clear()
+        _token.cache_clear()
     assert "16 to 128 letters" in capsys.readouterr().err
