@@ -48,7 +48,8 @@ class Answer:
     """The window's answer: `proof` that it has the token, a `challenge`, and who it is.
 
     `window` is a secret that tells it from others, `machine` its machine's name, and `finger` the
-    one that the connection is for; without one it asks what there is.
+    one that the connection is for; without one it asks what there is. It has received the reports
+    up to the number `seen`, below zero none.
     """
 
     version: str
@@ -57,11 +58,12 @@ class Answer:
     window: str
     machine: str
     finger: str | None
+    seen: int = -1
 
 
 @dataclass(frozen=True)
 class Welcome:
-    """The engine's answer to that: its `proof`, and what is requested of each finger.
+    """The engine's answer to that: its `proof`, and what is requested of each finger, if asked.
 
     `received` is the number of the last `Change` that came from this window, below zero where none
     did since another window was connected, or the engine was started.
@@ -244,10 +246,13 @@ class EngineAddress:
         """The host and the port as text."""
         return place_text(self.host, self.port)
 
-    def connect(self, finger: str | None, within: float) -> tuple[MessageSocket, Welcome]:
+    def connect(
+        self, finger: str | None, within: float, seen: int = -1
+    ) -> tuple[MessageSocket, Welcome]:
         """A connection, and what the engine has: a `SourceError` where there is none.
 
-        Where it is denied, a plain `Refusal`. It takes at most some `within` s.
+        Where it is denied, a plain `Refusal`. It takes at most some `within` s. `seen` as of
+        `Answer`.
         """
         end = time.monotonic() + within
         try:
@@ -258,7 +263,7 @@ class EngineAddress:
                 f"({error.strerror or error}); start `kappaskin serve` there"
             ) from error
         try:
-            return line, self._introduce(line, finger, end)
+            return line, self._introduce(line, finger, end, seen)
         except OSError as error:
             line.close()
             raise SourceError(
@@ -274,7 +279,7 @@ class EngineAddress:
             line.close()
             raise
 
-    def _introduce(self, line: MessageSocket, finger: str | None, end: float) -> Welcome:
+    def _introduce(self, line: MessageSocket, finger: str | None, end: float, seen: int) -> Welcome:
         greeting, challenge = line.expect(end), secrets.token_bytes(32)
         if isinstance(greeting, Denied):
             raise Refusal(f"{self.place}: {printable(greeting.reason)}")
@@ -284,7 +289,7 @@ class EngineAddress:
         both = greeting.challenge, challenge
         proof = proof_of(self.token, "window", *both)
         machine = platform.node()[:_NAME]
-        line.send(Answer(VERSION, proof, challenge, self.window, machine, finger))
+        line.send(Answer(VERSION, proof, challenge, self.window, machine, finger, seen))
         line.proven = True  # a large tare makes a long welcome
         welcome = line.expect(end)
         if isinstance(welcome, Denied):

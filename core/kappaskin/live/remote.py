@@ -110,7 +110,7 @@ class _Relay:
         self._line: MessageSocket | None = None
         self._changes: list[Change] = []  # that the server may not have
         self._numbers: list[tuple[int, int]] = []  # of a change, and of what was requested with it
-        self._number, self._known = 0, requested.number
+        self._number, self._known, self._seen = 0, requested.number, -1
         self._first, self._again, self._break = True, 0.0, _BREAK
         self._status = Status(state=WAITING, source=requested.source or "", setup=requested.setup)
         self._fields = dict[str, Any]()
@@ -189,7 +189,7 @@ class _Relay:
         short = self._clock.round_trip < _SHORT
         within = _FIRST if self._first else _AGAIN[0] if short else _AGAIN[1]
         try:
-            line, welcome = self._address.connect(self._finger, within)
+            line, welcome = self._address.connect(self._finger, within, self._seen)
         except Refusal as refusal:
             self._lose(str(refusal))
             self._again = time.monotonic() + self._break
@@ -278,6 +278,7 @@ class _Relay:
                 raise BadMessageError(f"expected no {type(message).__name__}")
 
     def _take_report(self, report: Report) -> None:
+        self._seen = report.number
         for name, data in report.fields.items():
             self._fields[name] = decoded(data, _TYPES[name])
         while self._numbers and self._numbers[0][0] <= report.received:

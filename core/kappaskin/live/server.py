@@ -73,18 +73,23 @@ class _Finger:
         self._covered = -1
         self._begin()
 
+        self._number, self._sent = 0, dict[str, tuple[int, bytes]]()
+
     def _begin(self) -> None:
-        self._number, self._next_report, self._next_shown = 0, 0.0, 0.0
-        self._told, self._sent = Status(), dict[str, bytes]()
+        self._told, self._next_report, self._next_shown = Status(), 0.0, 0.0
         self._count, self._generation, self._apart = 0, 0, _OFTEN
         self._under_way: deque[tuple[int, float]] = deque()
         self._ways: deque[float] = deque(maxlen=_WAYS)
 
-    def connect(self, line: MessageSocket, window: str) -> int:
-        """Serve this window from now on; the number of the last change that came from it."""
+    def connect(self, line: MessageSocket, window: str, seen: int) -> int:
+        """Serve this window from now on; the number of the last change that came from it.
+
+        It has the reports up to the number `seen`.
+        """
         if window != self.window:
-            self.window, self.received, self._covered = window, -1, -1
+            self.window, self.received, self._covered, seen = window, -1, -1, -1
             self._taken.clear()
+        self._sent = {name: each for name, each in self._sent.items() if each[0] <= seen}
         if self.line is not None:
             self.line.close()
         self.line = line
@@ -157,12 +162,13 @@ class _Finger:
             shown = replace(shown, recording=recording)
         while self._taken and self._taken[0][1] <= status.requested:
             self._covered = self._taken.popleft()[0]
-        changed = dict[str, bytes]()
+        changed, number = dict[str, bytes](), self._next(now)
         for each in fields(Status):
             data = encoded(getattr(shown, each.name))
-            if data != self._sent.get(each.name):
-                changed[each.name] = self._sent[each.name] = data
-        line.send(Report(self._next(now), self._covered, changed))
+            if data != self._sent.get(each.name, (0, b""))[1]:
+                changed[each.name] = data
+                self._sent[each.name] = number, data
+        line.send(Report(number, self._covered, changed))
 
     def _show(self, line: MessageSocket, now: float) -> None:
         """Send the newest estimate, if there is another one."""
@@ -303,8 +309,7 @@ class EngineServer:
         if finger is None:
             raise Refusal(f"expected a finger among {', '.join(self._fingers)}")
         del self._new[line]
-        received = finger.connect(line, answer.window)
-        line.send(Welcome(proof, {answer.finger: self._requested(answer.finger)}, received))
+        line.send(Welcome(proof, {}, finger.connect(line, answer.window, answer.seen)))
         if not self._owner:
             self._owner, self._since, self.taken_over = answer.window, time.monotonic(), True
             self.window = f"the window on {printable(answer.machine)[:80]} ({_address(line)})"

@@ -11,6 +11,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -27,14 +28,25 @@ from kappaskin.live import (
     Fingers,
     RemoteEngine,
     RemoteFingers,
+    Status,
     place_of,
     remote_engines,
 )
 from kappaskin.live import link as links
 from kappaskin.live.codec import encoded
-from kappaskin.live.link import Answer, Change, Denied, EngineAddress, Greeting, MessageSocket
+from kappaskin.live.link import (
+    Answer,
+    Change,
+    Denied,
+    EngineAddress,
+    Greeting,
+    MessageSocket,
+    Report,
+    Seen,
+)
 from kappaskin.recording import Recording, Verification
 from kappaskin.recording.recompute import RecordedFrames
+from kappaskin.sources import open_source
 
 pytestmark = pytest.mark.slow
 
@@ -398,6 +410,11 @@ def test_other_places_are_refused(text: str) -> None:
         place_of(text)
 
 
+def test_an_engine_is_no_source_of_readings() -> None:
+    with pytest.raises(Refusal, match="kappaskin app --source engine:lab"):
+        open_source("engine:lab")
+
+
 def test_without_an_engine_there_the_refusal_says_what_to_start() -> None:
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
@@ -490,6 +507,32 @@ def test_nothing_queues_on_a_connection_that_takes_little(served: Served) -> Non
         time.sleep(5.0)
         ages = [age(far) for _ in range(100) if not time.sleep(0.02)]
         assert statistics.median(ages) < 1.0
+
+
+def test_what_the_window_has_is_not_sent_again_after_a_cut(served: Served) -> None:
+    assert wait_for(lambda: served.hand.status()[""].slot is not None)
+    line = let_in(served)
+    first = reports(line, 3)
+    assert set(first[0].fields) == {each.name for each in fields(Status)}
+    line.close()
+    address = EngineAddress("127.0.0.1", served.server.port, TOKEN, "w" * 32)
+    line, welcome = address.connect("", 5.0, first[1].number)  # the last one was lost
+    again = reports(line, 1)[0]
+    assert (welcome.fingers, again.number > first[-1].number) == ({}, True)
+    assert first[-1].fields.keys() <= again.fields.keys()
+    assert not {"sensor", "slot"} & again.fields.keys()
+    line.close()
+
+
+def reports(line: MessageSocket, count: int) -> list[Report]:
+    """So many reports."""
+    found: list[Report] = []
+    while len(found) < count:
+        message = line.expect(time.monotonic() + 10)
+        if isinstance(message, Report):
+            found.append(message)
+            line.send(Seen(message.number))
+    return found
 
 
 # What ends.
