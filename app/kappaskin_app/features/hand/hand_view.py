@@ -47,7 +47,7 @@ _THIN = 0.01  # of the hand, radius of an edge
 _STILL = 4.0  # px that the mouse may move in a click
 _PER_PIXEL, _PER_KEY = 0.5, 10.0  # degrees that the camera turns
 _PER_NOTCH = 1.1
-_FILLED = 0.72  # of the view, by the skins; arrows and names take room around them
+_FILLED = 0.66  # of the view, by the skins; names take room around them
 _SPAN = np.array([[-0.5, 0, 0], [0.5, 0, 0], [0, -0.5, 0], [0, 0.5, 0]])
 _AXES = np.array([[0, 0, 0], [1, 0, 0], [0, 0, 0], [0, 1, 0], [0, 0, 0], [0, 0, 1.0]])
 _KEYS = {
@@ -277,7 +277,7 @@ class HandView(QWidget):
             self.fit()
 
     def fit(self) -> None:
-        """Show the whole hand, from the front and a little from the left."""
+        """Show the whole hand, and a ball between its fingers, from the front."""
         if not self.fingers:
             return
         corners = np.concatenate(
@@ -297,7 +297,8 @@ class HandView(QWidget):
         camera.SetViewUp(*FROM_THE_LEFT.up)
         camera.SetViewAngle(30.0)
         renderer.ResetCamera(*np.column_stack([low, high]).ravel())
-        seen = [self.in_view(corner) for corner in corners]
+        ball = middle + (high - low).max() / 2 * np.concatenate([np.eye(3), -np.eye(3)])
+        seen = [self.in_view(point) for point in (*corners, *ball)]
         camera.Zoom(_FILLED / float(np.abs(seen).max()))
         self._turned = False
         self._axes.user_matrix = _matrix(np.eye(3), np.zeros(3), _AXIS * self._size)

@@ -211,7 +211,12 @@ def test_a_hand_cannot_be_recorded_to_a_file_that_exists(hand, until, tmp_path):
 
 
 def test_the_scenes_of_all_fingers_are_computed_before_one_is_chosen(hand, until):
-    until(lambda: not any("_answers" in each.name for each in multiprocessing.active_children()))
+    def computing():
+        children = multiprocessing.active_children()
+        return hand.session.making or any("_answers" in each.name for each in children)
+
+    until(lambda: not computing())
+    QTest.qWait(200)  # until the last of them is taken
     choose(hand, "index")
     assert not hand.session.making
     assert hand.session.scene.name == "fingertip-cap"
