@@ -21,6 +21,7 @@ from kappaskin.live import STREAMING, Engine, Fingers, ResumeInfo, Status
 from kappaskin.mechanics import Plate, PointLoad
 from kappaskin.pipeline import Setup
 from kappaskin.publish import of_finger
+from kappaskin.recording import HandRecorder
 from kappaskin.scenes import Scene
 from kappaskin.scenes.cylinders import CylinderStep, Presentation
 from kappaskin.sensing import Sensor
@@ -52,6 +53,7 @@ from kappaskin_app.shell.simulation import (
 )
 
 _MAKING = "Computing the scene; Ctrl+Z undoes it"
+_BESIDE = "Computing the scenes of the other fingers"
 _BEGUN = 64  # scenes, as many as are cached: the text of each may be a megabyte
 
 _Slow: TypeAlias = Written | tuple[Plate, str]
@@ -88,9 +90,12 @@ class ScenePreparation:
         self._slow: _Slow | None = None
         self._begun: deque[_Slow] = deque(maxlen=_BEGUN)
 
-    def ready(self, settings: Settings) -> bool:
-        """Whether the scene of `settings` is available at once; if not, start computing it."""
-        slow = _slow(settings)
+    def ready(self, settings: Settings, words: str = _MAKING) -> bool:
+        """Whether the scene of `settings` is available at once; if not, start computing it.
+
+        The status bar says so in `words`.
+        """
+        self._task.words, slow = words, _slow(settings)
         if self.busy and slow != self._slow:
             self._begun.pop()  # it is not needed any more
             self._task.stop()
@@ -219,8 +224,10 @@ class Session(QObject):
         self._restarts, self.running = False, True
         self._seek_target: float | None = None
         self._seek_time = 0.0
-        self._preparation = ScenePreparation(tasks, self._play)
-        self._preparation_of_others = ScenePreparation(tasks, self._play_others)
+        self._preparation, self.making = ScenePreparation(tasks, self._prepared), False
+        """And whether the scene that is shown is still computed."""
+        self._recorder = BackgroundTask(tasks, "", self._record_by)
+        self._records = False
         self.base: Setup | None = None
         if engine.resumed is None:
             engine.set_up(_setup_of(history.settings))
@@ -254,11 +261,6 @@ class Session(QObject):
     def simulating(self) -> bool:
         """Whether the panels determine the scene: not one from a file."""
         return self.inside and self._history.settings.written is None
-
-    @property
-    def making(self) -> bool:
-        """Whether the requested scene is still being computed."""
-        return self._preparation.busy
 
     @property
     def replaying(self) -> bool:
@@ -360,6 +362,7 @@ class Session(QObject):
             finger: used.get(finger) or settings_for(source, self._trusts(source))
             for finger, source in self._sources.items()
         }
+        self._play_others()
 
     def show_finger(self, finger: str) -> None:
         """Show another finger of the hand: its readings, with its settings.
@@ -420,14 +423,25 @@ class Session(QObject):
                 self._unplayed.add(finger)
         self._play_others()
 
+    def _prepared(self) -> None:
+        """Continue once a scene is computed."""
+        if self.making:
+            self._play()
+        self._play_others()
+
     def _play_others(self) -> None:
-        """Simulate the scenes of the fingers that are not shown, once each is computed."""
-        for finger in self._unplayed & self._history.others.keys():
-            if not self._preparation_of_others.ready(settings := self._history.others[finger]):
+        """Simulate the scenes of the fingers that are not shown, once each is computed.
+
+        All are computed before a finger is chosen: in a hand the engines take the processor, and
+        it may be long until a scene is computed.
+        """
+        for finger, settings in self._history.others.items():
+            if self.making or not self._preparation.ready(settings, _BESIDE):
                 return
-            with suppress(Refusal):  # which is told once it is shown
-                self.engine_of(finger).play(planned_scene(scene_of(settings)))
-            self._unplayed.discard(finger)
+            if finger in self._unplayed:
+                self._unplayed.discard(finger)
+                with suppress(Refusal):  # which is told once it is shown
+                    self.engine_of(finger).play(planned_scene(scene_of(settings)))
 
     def engine_of(self, finger: str) -> Engine:
         return self.fingers.engines[finger] if self.fingers else self.engine
@@ -521,7 +535,8 @@ class Session(QObject):
     def _play(self) -> None:
         """Simulate the scene of the settings, or keep the last one and report why."""
         settings = self._history.settings
-        if not self._preparation.ready(settings):
+        self.making = not self._preparation.ready(settings)
+        if self.making:
             self.refused.emit("")
             self.preparing.emit(True)
             return
@@ -540,6 +555,7 @@ class Session(QObject):
         self.playing.emit(self.scene)
         self.refused.emit(why)
         self.preparing.emit(False)
+        self._play_others()
 
     def scan_tradeoff(self) -> ScanTradeoff | None:
         """The trade-off of the region in use, None without a contact."""
@@ -607,13 +623,25 @@ class Session(QObject):
         return replace(status, connections=first + status.connections, recording=recording)
 
     def record(self, path: Path | None) -> None:
-        """Record to `path` from now on, a hand with all its fingers; None ends that."""
+        """Record to `path` from now on, a hand with all its fingers; None ends that.
+
+        The recorder of a hand is started in the background.
+        """
         if self.fingers is None:
             self.engine.record(path)
+        elif path is not None and not self._recorder.running:
+            self._records = True
+            self._recorder.run(HandRecorder, path.absolute(), tuple(self.fingers.engines))
         elif path is None:
+            self._records = False
             self.fingers.stop_recording()
-        else:
-            self.fingers.record(path)
+
+    def _record_by(self, recorder: HandRecorder) -> None:
+        """Record the hand, unless that was ended while the recorder was started."""
+        if self.fingers is not None:
+            self.fingers.record(recorder)
+            if not self._records:
+                self.fingers.stop_recording()
 
     @property
     def _lost(self) -> bool:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, cast
 
 from kappaskin.errors import Refusal
-from kappaskin.hand.placement import Triple
+from kappaskin.hand.pose import Triple
 
 STALE = 0.1
 """Seconds after which a target is not followed any more, unless another one came."""

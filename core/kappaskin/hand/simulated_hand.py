@@ -20,7 +20,7 @@ import scipy
 from kappaskin.bases import basis_for
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Mask
-from kappaskin.hand.placement import Placement, Triple, placement
+from kappaskin.hand.pose import Placement, Triple, placement
 from kappaskin.mechanics import (
     Block,
     Cylinder,

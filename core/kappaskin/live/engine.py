@@ -455,9 +455,13 @@ class Fingers:
         played = (source.startswith(ReplayedSource.SCHEME) for source in sources.values())
         self._opening = len(sources) > 1 and all(played)
 
-    def record(self, path: Path) -> None:
-        """Record all fingers to one file from now on; a `Refusal` where there can be none."""
-        self._recorder = HandRecorder(path.absolute(), tuple(self.engines))
+    def record(self, to: Path | HandRecorder) -> None:
+        """Record all fingers to one file from now on; a `Refusal` where there can be none.
+
+        Or by a recorder that has been made elsewhere, as in a thread: that takes a while.
+        """
+        made = to if isinstance(to, HandRecorder) else HandRecorder(to.absolute(), [*self.engines])
+        self._recorder = made
         for finger, engine in self.engines.items():
             engine.record(self._recorder.part(finger))
 

@@ -45,7 +45,7 @@ from kappaskin.scenes import SCENES
 _REPORT = 0.1  # s between two reports of the status
 _OFTEN, _SELDOM = 1 / 70, 0.1  # s between two estimates: a screen shows no more; on a bad link
 _SLOWER, _FASTER = 1.5, 0.95  # times that, after one that came late, or in time
-_QUEUED = 0.04  # s that what is sent may wait on the way, besides the way itself
+_QUEUED = 0.15  # s that what is sent may wait on the way, besides the way itself
 _UNKNOWN = 1.0  # s that the way may take until it is known
 _WAYS = 64  # messages by which it is known
 _SILENT = 3.0  # s after which a window that sends nothing is gone

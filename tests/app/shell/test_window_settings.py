@@ -164,11 +164,11 @@ def test_every_control_obeys_the_keyboard_and_can_be_undone_and_redone(
     window.history.change("All", -1, load_case="two-points", side_x=0.03, x=0.02, region="skin")
     obeyed = set()
     window.actions_by_name["dock-compare"].trigger()
-    for page in range(window.panels.count() + 1):
-        if page < window.panels.count():
+    for page in [*range(window.panels.count()), "dock-design", "dock-operator"]:
+        if isinstance(page, int):
             window.panels.setCurrentIndex(page)
         else:
-            window.actions_by_name["dock-design"].trigger()
+            window.actions_by_name[page].trigger()
         for form in window.findChildren(Form):
             redone = False
             for editor in form.editors():
@@ -203,6 +203,7 @@ def test_every_control_obeys_the_keyboard_and_can_be_undone_and_redone(
     hidden = {*lengths, *(f"design_{length}" for length in lengths), "size", "size_y"}
     hidden -= {"design_side_x", "design_side_y"}
     hidden |= {"design_pattern", "design_count", "design_rings"}  # of round skins
+    hidden |= {"operator_listens", "operator_rumble", "robot_at"}  # of what is switched off
     hidden |= {"design_height_noise", "design_slope_noise"} | {"added_noise"}  # of a device
     hidden -= set(SHAPES[shape].lengths)
     assert asked - obeyed == hidden

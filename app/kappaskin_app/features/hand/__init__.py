@@ -1,5 +1,6 @@
 """Hand: a small map of each finger; a click shows the finger in the window."""
 
+import math
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,7 +14,7 @@ from PySide6.QtWidgets import QButtonGroup, QHBoxLayout, QRadioButton, QVBoxLayo
 from kappaskin._text import NONE, rounded, with_error
 from kappaskin.errors import Refusal
 from kappaskin.frames import Contact, Estimate
-from kappaskin.hand import Grasp, HeldObject, Placement, is_hand
+from kappaskin.hand import Grasp, HeldObject, JointReceiver, Placement, is_hand
 from kappaskin.live import Status
 from kappaskin_app.features.hand.grasp import FingerReading, GraspRecognition, held_text, sums_of
 from kappaskin_app.features.hand.hand_view import HandView, ShownFinger
@@ -42,6 +43,7 @@ _LEAST = 0.01  # mm, of the scale
 _PERIOD = 0.3  # s between two recognitions of what is held
 _APART = 12  # px between two fingers
 _WIDEST = "(00.00, 00.00) \N{PLUS-MINUS SIGN} 0.000 mm"
+_OLD_ANGLES = 1.0  # s
 _HELD = "Held"
 _TEXTS = {
     _HELD: "Plane, sphere, cylinder or edge that fits the places and normals of all contacts, with "
@@ -149,6 +151,7 @@ class HandPanel(QWidget):
         self.recognition = GraspRecognition(tasks, self)
         self.recognition.found.connect(guarded(self._show_grasp))
         self.held: HeldObject | None = None
+        self._joints: JointReceiver | None = None
         buttons = QButtonGroup(self)
         row, column = QHBoxLayout(), QVBoxLayout(self)
         row.setSpacing(_APART)
@@ -200,7 +203,7 @@ class HandPanel(QWidget):
         placements: Mapping[str, Placement] = {}
         if hand is not None:
             try:
-                placements = hand.placements()
+                placements = hand.placements(self._angles(hand.angles_from))
             except Refusal as refusal:
                 why = sentence(str(refusal))
         self.hand_view.setVisible(bool(placements))
@@ -227,6 +230,27 @@ class HandPanel(QWidget):
             self._next = now + _PERIOD
             self.recognition.start([one for name, one in there.items() if not seen[name].old])
         self.hand_view.show_hand(drawn, self.held)
+
+    def _angles(self, url: str) -> dict[str, float] | None:
+        """The values of the hand's joints, which come to `url`; None where they come nowhere."""
+        if not url:
+            return None
+        if self._joints is None:
+            self._joints = JointReceiver(url)
+        angles = self._joints.angles
+        if _OLD_ANGLES < self._joints.age < math.inf:
+            raise Refusal(
+                f"the last joint angles came to {url} {self._joints.age:.0f} s ago; check the "
+                "program that sends them"
+            )
+        return angles
+
+    def close(self) -> bool:
+        """Let go of the port of the joints and of the drawing."""
+        if self._joints is not None:
+            self._joints.close()
+        self.hand_view.close_plotter()
+        return super().close()
 
     def _show_grasp(self, grasp: Grasp, held: HeldObject) -> None:
         self.held = held
@@ -303,4 +327,4 @@ class HandFeature:
             session.finger_changed.connect(guarded(show))
             show(session.finger)
         shell.begun.connect(guarded(lambda *_: shell.docks.reveal("hand")))
-        shell.closed.connect(guarded(panel.hand_view.close_plotter))
+        shell.closed.connect(guarded(panel.close))

@@ -22,7 +22,7 @@ from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.settings.operation import GAMEPAD, PAD, UDP
 
 _EVERY = 8  # ms between two targets
-_SHOWN = 5  # of them between two reports
+_REPORTED = 0.04  # s between two reports
 
 
 def limits_of(settings: Settings) -> OperatorLimits:
@@ -59,7 +59,8 @@ class OperatorControl(QObject):
         self._grip: float | None = None
         self.rumble = 0.0
         """How strongly a gamepad rumbles, as a share of the strongest."""
-        self._input, self._ticks = history.settings.operator_input, 0
+        self._input, self._next = history.settings.operator_input, 0.0
+        self._shown = False, ""
         self._timer = QTimer(self, interval=_EVERY, timerType=Qt.TimerType.PreciseTimer)  # pyright: ignore[reportCallIssue]
         self._timer.timeout.connect(guarded(self._tick))
 
@@ -105,8 +106,9 @@ class OperatorControl(QObject):
             self.close()
             self.refused.emit(str(refusal))
             return
-        self._ticks += 1
-        if self._ticks % _SHOWN == 0:
+        shown, self._shown = self._shown, (self.enabled, self.status.state)
+        if shown != self._shown or time.monotonic() >= self._next:
+            self._next = time.monotonic() + _REPORTED
             self.reported.emit(self.status)
 
     def _request(self, settings: Settings, limits: OperatorLimits) -> None:

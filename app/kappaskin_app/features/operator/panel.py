@@ -152,7 +152,8 @@ class OperatorPanel(QWidget):
     def show_settings(self, settings: Settings) -> None:
         self._settings = settings
         self.form.show_settings(settings)
-        self.grip.setEnabled(settings.operator_input == PAD)
+        for widget in (self.pad, self.grip):
+            widget.setEnabled(settings.operator_input == PAD)
 
     def show_enabled(self, on: bool) -> None:
         with QSignalBlocker(self.enable):

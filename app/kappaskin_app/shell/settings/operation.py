@@ -43,12 +43,12 @@ class OperationSettings:
         ),
     )
     operator_speed: float = setting(
-        0.05, Range("Speed", "Largest speed of the hand.", 1e-3, 1.0, 5e-3, 1e3, "mm/s")
+        0.05, Range("Speed limit", "Largest speed of the hand.", 1e-3, 1.0, 5e-3, 1e3, "mm/s")
     )
     operator_turn_rate: float = setting(
         math.radians(30.0),
         Range(
-            "Turn rate",
+            "Turn rate limit",
             "Largest turn rate of the hand.",
             math.radians(1.0),
             2 * math.pi,
@@ -58,7 +58,10 @@ class OperationSettings:
         ),
     )
     operator_grip: float = setting(
-        1.5, Range("Grip", "Largest force with which each finger grips.", 0.1, 50.0, 0.5, 1, "N", 1)
+        1.5,
+        Range(
+            "Grip limit", "Largest force with which each finger grips.", 0.1, 50.0, 0.5, 1, "N", 1
+        ),
     )
     operator_reach_x: float = _reach("x")
     operator_reach_y: float = _reach("y")
