@@ -165,7 +165,7 @@ def open_source(name: str, trust: bool = False) -> Source:
     """The source called `name`: `sim:SCENE`, `replay:FILE`, `feed:NAME`, or what pyserial opens.
 
     A plug-in may open others. With `trust` a scene may name files outside its folder.
-    `replay:` is registered by the room `recording`, as soon as that is imported.
+    `replay:` is registered by the room `recording`, `hand:` by `hand`, once these are imported.
     """
     if not name.strip():
         raise SourceError(
