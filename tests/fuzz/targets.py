@@ -28,6 +28,8 @@ from kappaskin import (
 )
 from kappaskin.calibration import Tare, TareStore
 from kappaskin.calibration.calibration import digest, fingerprint
+from kappaskin.hand import HandTarget, TargetMessage
+from kappaskin.hand.operation import decoded
 from kappaskin.live.resume import resume_process
 from kappaskin.mechanics import HeightMap, Mesh
 from kappaskin.pipeline import reconstruct, setup_from_text, setup_to_text
@@ -159,6 +161,12 @@ def _content(data: bytes, _: Path) -> None:
 def _information(data: bytes, _: Path) -> None:
     sensor = information.sensor_from_json(data.decode(errors="replace"))
     information.sensor_from_json(information.sensor_to_json(sensor))
+
+
+def _hand_target(data: bytes, _: Path) -> None:
+    message = decoded(data)
+    if decoded(message.encoded()) != message:
+        raise RuntimeError("it came back as another")
 
 
 _SCAN = encode_samples(7, 0.1, np.arange(300), np.arange(300, dtype=np.int32), 2)
@@ -426,6 +434,12 @@ TARGETS = (
         _content,
         tuple(piece[22:-4] for piece in _PIECES),
         (bytes([2, 1, 0, 0, 255, 255]), bytes([4, 255]), b"\xff\xff"),
+    ),
+    Target(
+        "hand target",
+        _hand_target,
+        (TargetMessage(HandTarget((0.01, -0.02, 0.03), grip=1.0), True, 7, 3).encoded(),),
+        (*_JSON, b"NaN", b"-0.0"),
     ),
     Target("information", _information, (_PIECES[0][22:-4],), _JSON),
     Target(
