@@ -84,7 +84,8 @@ def run(
         description of a hand.
     source
         `sim:`, `sim:SCENE`, `replay:FILE`, `feed:NAME`, or a port or URL for pyserial; of a hand
-        NAME=SOURCE for each finger, `hand:NAME`, or the file of its description.
+        NAME=SOURCE for each finger, `hand:NAME`, or the file of its description. `engine:HOST` is
+        what `kappaskin serve` runs in another room; its token is in KAPPASKIN_TOKEN, or asked for.
     seconds
         Close after this many seconds; the window opens with the default theme and layout.
     screenshot

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 from kappaskin._files import user_folder
 from kappaskin._plugins import found_plug_ins
 from kappaskin._processes import preload_library
+from kappaskin._text import printable
 from kappaskin.errors import Refusal
 
 if TYPE_CHECKING:
@@ -41,6 +42,7 @@ _LOADED = {
 }
 """Modules that take long to import, in this order, with the texts of the splash screen."""
 
+_ELSEWHERE, _TOKEN = "engine:", "KAPPASKIN_TOKEN"
 _IDLE = 1500  # ms from the window's start until what only charts need is loaded
 _BEHIND = 5  # of 19 steps that drawing stands behind the engine when both want a core
 
@@ -67,8 +69,9 @@ def opened(
         # Beside: the engine's process starts while this one loads VTK.
         fingers = {"": source} if isinstance(source, str) else source
         first = next(iter(fingers.values()))
+        token = _token(first)
         with ThreadPoolExecutor(1) as beside:
-            starting = beside.submit(_connected, fingers, _scene_of(first) in trusted)
+            starting = beside.submit(_connected, fingers, _scene_of(first) in trusted, token)
             try:
                 for module, words in _LOADED.items():
                     if splash is not None:
@@ -78,19 +81,25 @@ def opened(
                 starting.result().close()
                 raise
         engine = starting.result()
+    if token:
+        fingers = {finger: each.source or "" for finger, each in engine.engines.items()}
+        first = next(iter(fingers.values()))
     _stand_behind()
     try:
         from PySide6.QtCore import QTimer
 
         from kappaskin_app.features import all_features
         from kappaskin_app.shell.background import BackgroundTask, collect_garbage_here
+        from kappaskin_app.shell.recovery import settings_left
         from kappaskin_app.shell.window import MainWindow
         from kappaskin_app.widgets.chart import load_charts
 
         if splash is not None:
             splash.say("Building the window")
         window = MainWindow(all_features(), first, engine, trusted)
-        window.session.begin_fingers(fingers, hand)
+        engines = engine.engines.items()
+        used = {finger: settings_left(each.resumed) for finger, each in engines if each.resumed}
+        window.session.begin_fingers(fingers, hand, used)
     except BaseException:
         engine.close()
         raise
@@ -160,10 +169,33 @@ def _scene_of(source: str) -> Path:
     return Path(source.removeprefix("sim:").strip()).absolute()
 
 
-def _connected(sources: Mapping[str, str], trust: bool) -> "Engine | Fingers":
-    """Engines that read `sources`, or one that still records for an earlier window."""
-    from kappaskin.live import Engine, Fingers, resume_folder
+def _token(source: str) -> str:
+    """The token for an engine in another room, asked for if need be; empty for other sources."""
+    if not source.startswith(_ELSEWHERE):
+        return ""
+    if token := os.environ.get(_TOKEN):
+        return token
+    from PySide6.QtWidgets import QInputDialog, QLineEdit
 
+    place = printable(source.removeprefix(_ELSEWHERE))
+    asked = f"Token of the engine at {place}, which kappaskin serve printed there:"
+    token, given = QInputDialog.getText(
+        None, "Connect to an engine", asked, QLineEdit.EchoMode.Password
+    )
+    if not (given and token):
+        raise Refusal(f"expected the token of the engine at {place} in {_TOKEN}, got none")
+    return token.strip()
+
+
+def _connected(sources: Mapping[str, str], trust: bool, token: str) -> "Engine | Fingers":
+    """Engines that read `sources`, or one that still records for an earlier window.
+
+    With a `token` those that already run at another machine.
+    """
+    from kappaskin.live import Engine, Fingers, remote_engines, resume_folder
+
+    if token:
+        return remote_engines(next(iter(sources.values())), token)
     if "" not in sources:
         fingers = Fingers(sources)
         fingers.connect(sources, trust)

@@ -285,8 +285,9 @@ def colours_in_use() -> ColourMap:
 # What is drawn over each: seen against every one of its colours.
 LIGHT_INK, DARK_INK = "#f4f6f8", "#16191d"
 
-# In the 3-D view and its legend: an excluded element, and the element to press.
-OUT, WANTED = "#e8267d", "#ffd400"
+# In 3-D views and their legend: an excluded element, the element to press, what is estimated of the
+# contact.
+OUT, WANTED, CONTACT = "#e8267d", "#ffd400", "#1fd17a"
 
 # A reading on a rail: in none of the maps above.
 SATURATED = "#9b30d0"

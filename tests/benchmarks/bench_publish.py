@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 import socket
 import subprocess
 import sys
@@ -16,6 +17,8 @@ import pytest
 
 from kappaskin import Simulator, load_scene
 from kappaskin.live import Engine
+from kappaskin.pipeline import usual_setup
+from kappaskin.publish import TargetStatus
 from kappaskin.sources.information import sensor_to_json
 
 _PUBLISHING = Path(__file__).with_name("publishing.py")
@@ -126,6 +129,45 @@ def pressed(play, tmp_path: Path) -> str:
     counts.write_bytes(np.array(frames).astype("<i2").tobytes())
     information.write_text(sensor_to_json(replace(scene, transduction=quick).sensor()))
     return play("--rate", 2000, "--counts", counts, "--information", information)
+
+
+@pytest.mark.parametrize("name", ["fingertip", "fingertip-cap"])
+def test_cues_are_sent_soon_after_the_bytes(
+    play, figure, ratio, seconds, receiver, tmp_path, name
+) -> None:
+    rate, scene = 400, load_scene(name)
+    chain = scene.transduction
+    quick = replace(chain, converter=replace(chain.converter, conversion_time=1e-6))
+    scene = replace(scene, transduction=quick, rate=float(rate))
+    simulator = Simulator(scene)
+    frames = [simulator.frame(number, time.monotonic).counts for number in range(6 * rate)]
+    frames = frames[3 * rate :]  # of the cap those in which one contact rolls
+    counts, information = tmp_path / "counts.bin", tmp_path / "information.json"
+    counts.write_bytes(np.array(frames).astype("<i2").tobytes())
+    information.write_text(sensor_to_json(scene.sensor()))
+    played = ("--counts", counts, "--information", information)
+    port = play("--rate", rate, *played, "--channels", frames[0].size)
+    with Engine(replace(usual_setup(scene.sensor()), quantities=())) as engine:
+        engine.connect(port)
+        engine.publish([f"cue://127.0.0.1:{receiver}"])
+        time.sleep(4)
+        before = engine.status()
+        time.sleep(seconds)
+        after = engine.status()
+    old, new = (status.publishing.targets[0] for status in (before, after))
+    sent, missed = ((b - a) / seconds for a, b in ((old.sent, new.sent), _missed(old, new)))
+    frames_read = (after.accounting.accepted - before.accounting.accepted) / seconds
+    skipped = (after.skipped - before.skipped) / seconds
+    figure(
+        f"cues of {name} at {frames_read:.0f} frames/s, {skipped:.0f} of them skipped: "
+        f"{1e3 * new.cue.half:.2f} ms after the bytes, 99 % within {1e3 * new.cue.most:.2f} ms; "
+        f"{sent:.0f} sent and {missed:.0f} missed a second; load {os.getloadavg()[0]:.1f}"
+    )
+    ratio(f"latency of cues of {name}, of the 5 ms allowed", new.cue.most / 5e-3, at_most=1)
+
+
+def _missed(old: TargetStatus, new: TargetStatus) -> tuple[int, int]:
+    return old.cue.missed, new.cue.missed
 
 
 def test_2000_frames_a_second_are_published(pressed, figure, ratio, seconds, receiver) -> None:

@@ -28,8 +28,10 @@ from kappaskin import (
 )
 from kappaskin.calibration import Tare, TareStore
 from kappaskin.calibration.calibration import digest, fingerprint
-from kappaskin.hand import HandTarget, TargetMessage
-from kappaskin.hand.operation import decoded
+from kappaskin.hand import HandTarget, TargetMessage, operation
+from kappaskin.live.codec import decoded, encoded
+from kappaskin.live.link import Answer, Change, Message, Seen
+from kappaskin.live.requests import Note, Requested, Seek
 from kappaskin.live.resume import resume_process
 from kappaskin.mechanics import HeightMap, Mesh
 from kappaskin.pipeline import reconstruct, setup_from_text, setup_to_text
@@ -164,8 +166,8 @@ def _information(data: bytes, _: Path) -> None:
 
 
 def _hand_target(data: bytes, _: Path) -> None:
-    message = decoded(data)
-    if decoded(message.encoded()) != message:
+    message = operation.decoded(data)
+    if operation.decoded(message.encoded()) != message:
         raise RuntimeError("it came back as another")
 
 
@@ -419,6 +421,17 @@ def _note(data: bytes, folder: Path) -> None:
         raise RuntimeError("nobody is there")
 
 
+def _link(data: bytes, _: Path) -> None:
+    """What a window and an engine in another room tell each other."""
+    decoded(data, Message, 10**6)
+
+
+_REQUESTED = Requested(source="sim:").doing(Seek(1.0, 2.0))
+_LINK = (
+    encoded(Answer("0.2.0", b"proof", b"challenge", "window", "machine", None)),
+    encoded(Change(1, {"setup": encoded(_REQUESTED.setup)}, (Note("pressed"), Seek(1.0, 1.0)))),
+    encoded(Seen(3)),
+)
 _FILE, _MESSAGES = _recorded()
 
 TARGETS = (
@@ -473,6 +486,7 @@ TARGETS = (
     Target("window", _window, (to_text(WindowState()).encode(),), _TOML),
     Target("calibration", _calibration, (_calibrated(3), _calibrated(1)), _TOML),
     Target("tares", _tares, (_tared(),), _TOML),
+    Target("link", _link, _LINK, (b"\0\0\0\0", b"\xff\xff\xff\x7f", b"\xf0", *_JSON)),
     Target("note", _note, (b"0.1.0 " + b"5c" * 32,), (b" ", b"\xc3\xa9", b"zz")),
     Target("recording", _recording, (_FILE,), (b"\x06", b"\x04\0\0\0lz4", b"\xff" * 8)),
     Target("messages", _messages, (_MESSAGES,), (b"\0\1\0\0", b"\xff" * 4, *_JSON)),

@@ -1,6 +1,7 @@
 """Background tasks: computing in threads and processes, with progress and cancelling."""
 
 import gc
+import sys
 import threading
 import time
 from collections import deque
@@ -10,7 +11,7 @@ from functools import partial
 from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
-from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtCore import QObject, QProcess, QTimer, Signal
 
 from kappaskin._processes import BackgroundProcess, items_of
 from kappaskin.errors import Refusal
@@ -321,3 +322,8 @@ class Newest(QObject):
         """Drop the waiting call."""
         self._waiting = None
         self._timer.stop()
+
+
+def open_another_window(*arguments: str) -> None:
+    """Start the app again with these `arguments`, as a program that outlives this one."""
+    QProcess.startDetached(sys.executable, ["-m", "kappaskin", "app", *arguments])

@@ -22,7 +22,8 @@ from kappaskin_app.shell.centre import BannerAction
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.parts import Parts
 from kappaskin_app.shell.session import Session
-from kappaskin_app.shell.settings import Settings
+from kappaskin_app.shell.settings import EstimatorSettings, Settings
+from kappaskin_app.shell.settings.form_fields import settings_from
 from kappaskin_app.shell.settings.scene import Written
 from kappaskin_app.shell.simulation import settings_for
 
@@ -86,7 +87,10 @@ def _value(name: str, value: Any) -> Any:
 
 
 class SettingsHandover:
-    """Hands the settings to the engine, which may outlive the window while it records."""
+    """Hands the settings to an engine that may outlive the window.
+
+    One of this machine while it records, one in another room always.
+    """
 
     def __init__(self, history: History, session: Session) -> None:
         self._history, self._session = history, session
@@ -94,7 +98,7 @@ class SettingsHandover:
 
     def follow(self, status: Status) -> None:
         settings = self._history.settings
-        if status.recording.active and settings is not self._left:
+        if (status.recording.active or status.link) and settings is not self._left:
             self._left = settings
             self._session.engine.store_window_state(settings_text(settings).encode())
 
@@ -105,12 +109,18 @@ def settings_left(left: ResumeInfo) -> Settings:
     try:
         settings = settings_in(left.requested.window_state.decode(errors="replace"))
     except Refusal:
-        return settings_for(left.requested.source or "")
+        settings = settings_for(left.requested.source or "")
+        if left.place:
+            settings = replace(settings, **settings_from(vars(setup), EstimatorSettings))
+    if left.place and settings.written:  # it names files of another machine
+        settings = replace(settings, written=replace(settings.written, trust=False))
     return replace(settings, calibration=setup.calibration, tare=setup.tare)
 
 
 def resume_text(left: ResumeInfo, wanted: str) -> str:
     """What is reported of a resumed recording to a user who requested the source `wanted`."""
+    if left.place:
+        return f"The engine at {left.place} is shown, with the settings that it had."
     file, source = Path(left.requested.recording or "").name, left.requested.source
     text = f"The recording {file}{_of(source)} {left.lasted}."
     if wanted == (source or "sim:"):

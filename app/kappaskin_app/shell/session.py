@@ -21,6 +21,7 @@ from kappaskin.live import STREAMING, Engine, Fingers, ResumeInfo, Status
 from kappaskin.mechanics import Plate, PointLoad
 from kappaskin.pipeline import Setup
 from kappaskin.publish import of_finger
+from kappaskin.recording import HandRecorder
 from kappaskin.scenes import Scene
 from kappaskin.scenes.cylinders import CylinderStep, Presentation
 from kappaskin.sensing import Sensor
@@ -52,6 +53,7 @@ from kappaskin_app.shell.simulation import (
 )
 
 _MAKING = "Computing the scene; Ctrl+Z undoes it"
+_BESIDE = "Computing the scenes of the other fingers"
 _BEGUN = 64  # scenes, as many as are cached: the text of each may be a megabyte
 
 _Slow: TypeAlias = Written | tuple[Plate, str]
@@ -88,9 +90,12 @@ class ScenePreparation:
         self._slow: _Slow | None = None
         self._begun: deque[_Slow] = deque(maxlen=_BEGUN)
 
-    def ready(self, settings: Settings) -> bool:
-        """Whether the scene of `settings` is available at once; if not, start computing it."""
-        slow = _slow(settings)
+    def ready(self, settings: Settings, words: str = _MAKING) -> bool:
+        """Whether the scene of `settings` is available at once; if not, start computing it.
+
+        The status bar says so in `words`.
+        """
+        self._task.words, slow = words, _slow(settings)
         if self.busy and slow != self._slow:
             self._begun.pop()  # it is not needed any more
             self._task.stop()
@@ -219,8 +224,10 @@ class Session(QObject):
         self._restarts, self.running = False, True
         self._seek_target: float | None = None
         self._seek_time = 0.0
-        self._preparation = ScenePreparation(tasks, self._play)
-        self._preparation_of_others = ScenePreparation(tasks, self._play_others)
+        self._preparation, self.making = ScenePreparation(tasks, self._prepared), False
+        """And whether the scene that is shown is still computed."""
+        self._recorder = BackgroundTask(tasks, "", self._record_by)
+        self._records = False
         self.base: Setup | None = None
         if engine.resumed is None:
             engine.set_up(_setup_of(history.settings))
@@ -254,11 +261,6 @@ class Session(QObject):
     def simulating(self) -> bool:
         """Whether the panels determine the scene: not one from a file."""
         return self.inside and self._history.settings.written is None
-
-    @property
-    def making(self) -> bool:
-        """Whether the requested scene is still being computed."""
-        return self._preparation.busy
 
     @property
     def replaying(self) -> bool:
@@ -345,15 +347,22 @@ class Session(QObject):
         self._play()
 
     def begin_fingers(
-        self, sources: Mapping[str, str], hand: HandDescription | None = None
+        self,
+        sources: Mapping[str, str],
+        hand: HandDescription | None = None,
+        settings: Mapping[str, Settings] | None = None,
     ) -> None:
-        """Begin with the `sources` of a hand, which its engines read already, and what it is."""
-        self.hand = hand
+        """Begin with the `sources` of a hand, which its engines read already, and what it is.
+
+        And with the `settings` of those that are in use.
+        """
+        self.hand, used = hand, settings or {}
         self._sources = {finger: each for finger, each in sources.items() if finger != self.finger}
         self._history.others = {
-            finger: settings_for(source, self._trusts(source))
+            finger: used.get(finger) or settings_for(source, self._trusts(source))
             for finger, source in self._sources.items()
         }
+        self._play_others()
 
     def show_finger(self, finger: str) -> None:
         """Show another finger of the hand: its readings, with its settings.
@@ -398,7 +407,7 @@ class Session(QObject):
         Of one that plays a recording when it is shown: until then all is as it was recorded.
         """
         for finger, settings in self._history.others.items():
-            source, engine = self._sources[finger], self._engine_of(finger)
+            source, engine = self._sources[finger], self.engine_of(finger)
             if source.startswith(RECORDED):
                 continue
             inside = source.startswith("sim:")
@@ -414,16 +423,27 @@ class Session(QObject):
                 self._unplayed.add(finger)
         self._play_others()
 
-    def _play_others(self) -> None:
-        """Simulate the scenes of the fingers that are not shown, once each is computed."""
-        for finger in self._unplayed & self._history.others.keys():
-            if not self._preparation_of_others.ready(settings := self._history.others[finger]):
-                return
-            with suppress(Refusal):  # which is told once it is shown
-                self._engine_of(finger).play(planned_scene(scene_of(settings)))
-            self._unplayed.discard(finger)
+    def _prepared(self) -> None:
+        """Continue once a scene is computed."""
+        if self.making:
+            self._play()
+        self._play_others()
 
-    def _engine_of(self, finger: str) -> Engine:
+    def _play_others(self) -> None:
+        """Simulate the scenes of the fingers that are not shown, once each is computed.
+
+        All are computed before a finger is chosen: in a hand the engines take the processor, and
+        it may be long until a scene is computed.
+        """
+        for finger, settings in self._history.others.items():
+            if self.making or not self._preparation.ready(settings, _BESIDE):
+                return
+            if finger in self._unplayed:
+                self._unplayed.discard(finger)
+                with suppress(Refusal):  # which is told once it is shown
+                    self.engine_of(finger).play(planned_scene(scene_of(settings)))
+
+    def engine_of(self, finger: str) -> Engine:
         return self.fingers.engines[finger] if self.fingers else self.engine
 
     def set_calibrating(self, calibrating: bool) -> None:
@@ -463,7 +483,7 @@ class Session(QObject):
 
     def _publish_to(self, settings: Settings, finger: str) -> str:
         """Publish a finger to the targets of its settings, or to none; why there are none."""
-        engine, number = self._engine_of(finger), 0
+        engine, number = self.engine_of(finger), 0
         if self.fingers is not None:
             number = list(self.fingers.engines).index(finger)
         try:
@@ -515,7 +535,8 @@ class Session(QObject):
     def _play(self) -> None:
         """Simulate the scene of the settings, or keep the last one and report why."""
         settings = self._history.settings
-        if not self._preparation.ready(settings):
+        self.making = not self._preparation.ready(settings)
+        if self.making:
             self.refused.emit("")
             self.preparing.emit(True)
             return
@@ -534,6 +555,7 @@ class Session(QObject):
         self.playing.emit(self.scene)
         self.refused.emit(why)
         self.preparing.emit(False)
+        self._play_others()
 
     def scan_tradeoff(self) -> ScanTradeoff | None:
         """The trade-off of the region in use, None without a contact."""
@@ -564,7 +586,7 @@ class Session(QObject):
         if reports := now >= self._next_status:
             self._next_status = now + _STATUS
             (self.fingers or self.engine).revive()
-            self.status = self._of_hand(self.engine.status())
+            self.status = self.status_of(self.finger)
             self._lost_since = min(self._lost_since, now) if self._lost else math.inf
             if self.status.connections != connections:
                 self.estimate = None  # the estimate was of the last sensor
@@ -588,22 +610,38 @@ class Session(QObject):
         if self.timer.isActive():
             self.timer.start(_DRAWN if shown else _TICK)
 
-    def _of_hand(self, status: Status) -> Status:
-        """The status with a number of connections that no other finger has, and the hand's file."""
+    def status_of(self, finger: str) -> Status:
+        """The status of a finger, with the hand's file.
+
+        Its number of connections is one that no other finger has.
+        """
+        status = self.engine_of(finger).status()
         if self.fingers is None:
             return status
-        first = _FINGERS * list(self.fingers.engines).index(self.finger)
+        first = _FINGERS * list(self.fingers.engines).index(finger)
         recording = self.fingers.recording
         return replace(status, connections=first + status.connections, recording=recording)
 
     def record(self, path: Path | None) -> None:
-        """Record to `path` from now on, a hand with all its fingers; None ends that."""
+        """Record to `path` from now on, a hand with all its fingers; None ends that.
+
+        The recorder of a hand is started in the background.
+        """
         if self.fingers is None:
             self.engine.record(path)
+        elif path is not None and not self._recorder.running:
+            self._records = True
+            self._recorder.run(HandRecorder, path.absolute(), tuple(self.fingers.engines))
         elif path is None:
+            self._records = False
             self.fingers.stop_recording()
-        else:
-            self.fingers.record(path)
+
+    def _record_by(self, recorder: HandRecorder) -> None:
+        """Record the hand, unless that was ended while the recorder was started."""
+        if self.fingers is not None:
+            self.fingers.record(recorder)
+            if not self._records:
+                self.fingers.stop_recording()
 
     @property
     def _lost(self) -> bool:

@@ -45,7 +45,7 @@ class MainWindow(Parts):
         engine: Engine | Fingers | None = None,
         trusted: frozenset[Path] = frozenset(),
     ) -> None:
-        handed = engine.resumed if isinstance(engine, Engine) else None
+        handed = next(iter(engine.engines.values())).resumed if engine else None
         if handed and source in ("sim:", DEFAULT_SOURCE):  # no other source was requested
             source = handed.requested.source or source
         super().__init__(settings_left(handed) if handed else settings_for(source), engine)

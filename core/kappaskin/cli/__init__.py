@@ -34,7 +34,7 @@ app = App(
 # A panel of the help for each group: the module that holds its commands and loads no room before
 # one of them runs, and their names.
 _PANELS = {
-    "Live": ("live", "publish listen"),
+    "Live": ("live", "publish serve listen"),
     "Recordings": ("record", "record info verify repair export import reconstruct"),
     "Sensor": ("sensor", "calibrate tare press monitor device"),
     "Studies": ("study", "plan simulate cost compare stability regions design study report"),

@@ -177,7 +177,7 @@ class FingerMonitor:
     """Follows a finger of a hand: uses its saved tare, and prints what happens to it, each once.
 
     Called now and then, it returns the status; `slope` is the largest that was neglected though it
-    matters.
+    matters. Without `tares` another one decides on the setup.
     """
 
     def __init__(self, finger: str, engine: "Engine") -> None:
@@ -185,11 +185,12 @@ class FingerMonitor:
         self.tared, self.slope = UsedTare(engine), 0.0
         self._printed = set[str]()
 
-    def __call__(self) -> "Status":
+    def __call__(self, tares: bool = True) -> "Status":
         from kappaskin.live import LOST
 
         status = self._engine.status()
-        self.tared(status)
+        if tares:
+            self.tared(status)
         self.slope = max(self.slope, status.slope)
         notices = [event.text for event in status.events if event.kind in ("noise", "engine")]
         if status.state == LOST or self._engine.silent:
@@ -198,7 +199,7 @@ class FingerMonitor:
             words = "".join(filter(str.isalpha, text))  # it may count seconds
             if words not in self._printed:
                 self._printed.add(words)
-                show(f"kappaskin: {self._finger}: {text}", error=True)
+                show(f"kappaskin: {self._finger and f'{self._finger}: '}{text}", error=True)
         return status
 
 

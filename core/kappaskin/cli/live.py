@@ -1,9 +1,10 @@
-"""Commands on live estimates: publish, listen."""
+"""Commands on live estimates: publish, serve, listen."""
 
 import math
 import time
 from contextlib import closing
 from itertools import combinations
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
@@ -11,6 +12,7 @@ from cyclopts import Parameter
 from kappaskin.cli.common import (
     FAILED,
     DescribedFingers,
+    FingerMonitor,
     SourceName,
     Sources,
     Switch,
@@ -93,8 +95,6 @@ def publish(
     from kappaskin.live import LOST, Fingers
     from kappaskin.pipeline import Setup
     from kappaskin.publish import targets_of
-    from kappaskin.scenes import load_scene
-    from kappaskin.sources import SimulatedSource
 
     check_time(seconds, "publish")
     fingers = fingers_of(source, sources, sensor)
@@ -107,9 +107,7 @@ def publish(
     if allow_origin and not places:
         raise Refusal("--allow-origin is for pages that connect to a server: give --foxglove")
     targets_of(targets)  # or refused here
-    for source in fingers.values():
-        if source.startswith(SimulatedSource.SCHEME):
-            load_scene(source.removeprefix(SimulatedSource.SCHEME), trust)  # or refused here
+    _check_scenes(fingers, trust)
     stopped = stops()
     with Fingers(fingers, Setup(quantities=())) as hand:
         hand.publish(targets, allow_origin or ())
@@ -123,6 +121,87 @@ def publish(
         cues = (target.cue.most for target in status.publishing.targets if target.cue)
         failed |= lost or all(map(math.isnan, (status.publishing.latency.whole, *cues)))
     return FAILED if failed else 0
+
+
+def serve(
+    source: SourceName | None = None,
+    /,
+    *,
+    sources: Sources = None,
+    listen: str = "127.0.0.1",
+    recordings: Path = Path(),
+    seconds: float = math.inf,
+    sensor: DescribedFingers = None,
+    trust: Switch = False,
+) -> int:
+    """Run the engine beside the hand, for a window in another room, until stopped (Ctrl+C).
+
+    There `kappaskin app --source engine:HOST` opens the window on it: one at a time, with the
+    settings in use here. What it changes is changed here; it sees the newest estimates as fast as
+    the connection takes them. It records to a file here, which has no hole when the connection is
+    cut. When the window is gone, the engine goes on as it is: it records, publishes and waits for
+    the next one.
+
+    Both ends need the same version and the same token: KAPPASKIN_TOKEN in the environment, or the
+    one that is made and printed. The token is never sent, but what follows is not encrypted: from
+    outside of a network that you trust, connect through a VPN, or by
+    `ssh -L 9871:localhost:9871 HOST` and `engine:localhost`.
+
+    Example: `kappaskin serve /dev/ttyACM0 --listen 0.0.0.0`
+
+    Example: `kappaskin serve --source thumb=/dev/ttyACM0 --source index=/dev/ttyACM1 --listen ::`
+
+    Parameters
+    ----------
+    source
+        `sim:`, `sim:SCENE`, `feed:NAME`, or a port or URL for pyserial.
+    listen
+        HOST or HOST:PORT of this machine to listen at, 9871 when there is no port: 127.0.0.1 for
+        this machine and ssh alone, 0.0.0.0 or :: for all that reach it.
+    recordings
+        Folder of what the window records; the current one when left out.
+    seconds
+        How long to serve; until stopped when left out.
+    trust
+        Let the scene name files outside its folder.
+    """
+    from kappaskin.live import EngineServer, Fingers, place_of
+    from kappaskin.publish import TOKEN, token_of
+
+    check_time(seconds, "serve")
+    fingers = fingers_of(source, sources, sensor)
+    if not recordings.is_dir():
+        raise Refusal(f"{recordings}: expected a folder for recordings; make it first")
+    _check_scenes(fingers, trust)
+    (host, port), (token, made) = place_of(listen), token_of()
+    stopped = stops()
+    with (
+        Fingers(fingers) as hand,
+        EngineServer(hand, fingers, host, port, token, recordings, trust) as server,
+    ):
+        hand.connect(fingers, trust)
+        begin = f"{TOKEN}={token} " if made else ""
+        show(f"in the other room: {begin}kappaskin app --source {server.invitation}")
+        end = time.monotonic() + seconds
+        monitors = [FingerMonitor(name, each) for name, each in hand.engines.items()]
+        while not stopped and time.monotonic() < end:
+            server.poll(_POLL)
+            hand.revive()
+            for monitor in monitors:
+                monitor(tares=not server.taken_over)
+            while server.notices:
+                show(f"kappaskin: {server.notices.pop(0)}", error=True)
+    return 0
+
+
+def _check_scenes(fingers: "dict[str, str]", trust: bool) -> None:
+    """Raise a `Refusal` for a scene that cannot be read."""
+    from kappaskin.scenes import load_scene
+    from kappaskin.sources import SimulatedSource
+
+    for source in fingers.values():
+        if source.startswith(SimulatedSource.SCHEME):
+            load_scene(source.removeprefix(SimulatedSource.SCHEME), trust)
 
 
 def _named(finger: str, text: str) -> str:
@@ -233,8 +312,8 @@ _READ = 0.1  # s
 def listen(*, udp: Whole = 9870, seconds: float = math.inf, json: Switch = False) -> int:
     """Print the messages received on a UDP port of this machine, until stopped (Ctrl+C).
 
-    Contacts (ten a second) with their standard deviations and their age when sent, every loss on
-    the network, the state of the source, and a summary. Exit code 1 if no contact came.
+    Contacts (ten a second) with their standard deviations and their age when sent, haptic cues,
+    every loss on the network, the state of the source, and a summary. Exit code 1 if none came.
 
     Example: `kappaskin listen --udp 9870`
 

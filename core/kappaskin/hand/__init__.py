@@ -6,6 +6,7 @@ from kappaskin.hand.description import HANDS as HANDS
 from kappaskin.hand.description import SCHEME as SCHEME
 from kappaskin.hand.description import Finger as Finger
 from kappaskin.hand.description import HandDescription as HandDescription
+from kappaskin.hand.description import JointReceiver as JointReceiver
 from kappaskin.hand.description import Linkage as Linkage
 from kappaskin.hand.description import angles_from_json as angles_from_json
 from kappaskin.hand.description import hand_file as hand_file
@@ -33,8 +34,8 @@ from kappaskin.hand.operation import TargetReceiver as TargetReceiver
 from kappaskin.hand.operator_link import OperatorLink as OperatorLink
 from kappaskin.hand.operator_link import OperatorSettings as OperatorSettings
 from kappaskin.hand.operator_link import OperatorStatus as OperatorStatus
-from kappaskin.hand.placement import Placement as Placement
-from kappaskin.hand.placement import placement as placement
+from kappaskin.hand.pose import Placement as Placement
+from kappaskin.hand.pose import placement as placement
 from kappaskin.hand.simulated_hand import FingerPress as FingerPress
 from kappaskin.hand.simulated_hand import HandCourse as HandCourse
 from kappaskin.hand.simulated_hand import HandState as HandState

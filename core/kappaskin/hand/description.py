@@ -3,7 +3,7 @@
 import math
 import time
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from importlib.resources import files
 from pathlib import Path
@@ -17,7 +17,7 @@ from kappaskin._schema import Key, Part, Unit, Within
 from kappaskin._toml import TomlTable, json_table, parsed
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
-from kappaskin.hand.placement import IDENTITY, Placement, Triple, placement, rotation_about
+from kappaskin.hand.pose import IDENTITY, Placement, Triple, placement, rotation_about
 from kappaskin.hand.simulated_hand import (
     SHAPES,
     HandCourse,
@@ -26,11 +26,12 @@ from kappaskin.hand.simulated_hand import (
     SimulatedObject,
 )
 from kappaskin.scenes import Scene, Trust, load_scene, named_file
-from kappaskin.sources import SimulatedSource, is_finger, register_scheme
+from kappaskin.sources import Datagrams, SimulatedSource, is_finger, register_scheme
 
 FORMAT = 1
 _LARGEST = 2**22  # bytes of a hand's file or of a URDF
 _MOST_FINGERS = 64
+_MOST_WAITING = 4096  # datagrams taken at a time: a second of them
 _FIXED, _TURNS, _SLIDES = ("fixed",), ("revolute", "continuous"), ("prismatic",)
 
 Angles = Mapping[str, float]
@@ -203,12 +204,14 @@ def _values(text: str, count: int, key: str, joint: str) -> list[float]:
 class HandDescription:
     """A hand with `fingers`; with a `linkage`, their links move as its joints do.
 
-    A hand that is `simulated` with an object closes its fingers on it.
+    A hand that is `simulated` with an object closes its fingers on it. The values of the joints
+    come by UDP to `angles_from`, as `udp://:PORT`, where that is not empty.
     """
 
     title: str
     fingers: tuple[Finger, ...]
     linkage: Linkage | None = None
+    angles_from: str = ""
     simulated: SimulatedHand | None = None
     text: str = ""
 
@@ -268,6 +271,12 @@ HAND = Part(
         "urdf": Key(
             "URDF",
             "A file with the hand's links and joints, beside this one.",
+            kind=str,
+            default="",
+        ),
+        "angles_from": Key(
+            "Angles from",
+            "Where the values of its joints come by UDP, as udp://:PORT.",
             kind=str,
             default="",
         ),
@@ -378,7 +387,8 @@ def load_hand(file: Path, trust: Trust = False) -> HandDescription:
         one.done()
     title = HAND.value(top, "title") or file.stem
     with top.blamed():
-        hand = HandDescription(title, tuple(fingers), linkage, text=HAND.value(top, "text"))
+        angles_from, text = HAND.value(top, "angles_from"), HAND.value(top, "text")
+        hand = HandDescription(title, tuple(fingers), linkage, angles_from, text=text)
         if "object" in top or "course" in top:
             hand = _simulated(hand, top, file, trust)
     top.done()
@@ -461,6 +471,42 @@ def _text(file: Path, what: str) -> str:
         return read_file(file, _LARGEST).decode("utf-8-sig")
     except (OSError, ValueError) as error:
         raise Refusal(f"{file}: cannot be read as {what} ({error}); check its name") from error
+
+
+class JointReceiver:
+    """Takes the values of joints that come by UDP to a `url` such as `udp://:9880`.
+
+    Each datagram is a JSON object that `angles_from_json` reads. Joints that it does not name keep
+    their values. `refused` counts what is none, and `refusal` says why the last one was.
+    """
+
+    def __init__(self, url: str, clock: Callable[[], float] = time.monotonic) -> None:
+        self._datagrams, self._at = Datagrams(url, clock), -math.inf
+        self._clock, self._angles = clock, dict[str, float]()
+        self.refused, self.refusal = 0, ""
+
+    @property
+    def angles(self) -> dict[str, float]:
+        """The newest value of each joint, in rad or m."""
+        for _ in range(_MOST_WAITING):
+            at, data = self._datagrams.arriving(within=0.0)
+            if not data:
+                break
+            try:
+                self._angles |= angles_from_json(data.decode("utf-8"))
+                self._at = at
+            except (Refusal, UnicodeDecodeError) as error:
+                self.refused += 1
+                self.refusal = str(error)
+        return dict(self._angles)
+
+    @property
+    def age(self) -> float:
+        """How long ago in s the last values came; infinity if none ever did."""
+        return self._clock() - self._at
+
+    def close(self) -> None:
+        self._datagrams.close()
 
 
 def angles_from_json(text: str) -> dict[str, float]:

@@ -15,7 +15,7 @@ from kappaskin.estimation import propagated_covariance
 from kappaskin.frames import Array
 from kappaskin.hand.grasp import FingerContact, Grasp
 from kappaskin.hand.held_object import ObjectFit
-from kappaskin.hand.placement import IDENTITY, Placement
+from kappaskin.hand.pose import IDENTITY, Placement
 
 _NIL = 1e-11  # of the largest information: less is none
 _HIDDEN = 1e-6  # of what is unknown: as much of it leaves a number unknown

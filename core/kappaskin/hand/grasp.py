@@ -12,7 +12,7 @@ from kappaskin.errors import Refusal
 from kappaskin.estimation import Fit, propagated_covariance
 from kappaskin.frames import Array, Estimate
 from kappaskin.hand.description import Finger
-from kappaskin.hand.placement import Placement
+from kappaskin.hand.pose import Placement
 
 _AXES = np.eye(3)
 

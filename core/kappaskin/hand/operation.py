@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, cast
 
 from kappaskin.errors import Refusal
-from kappaskin.hand.placement import Placement, Triple, placement
+from kappaskin.hand.pose import Placement, Triple, placement
 
 STALE = 0.1
 """Seconds after which a target is not followed any more, unless another one came."""

@@ -20,6 +20,7 @@ from kappaskin.frames import Array, Estimate, Event
 from kappaskin.live.differences import newest_pair
 from kappaskin.live.loop import serve
 from kappaskin.live.requests import (
+    Action,
     Note,
     Requested,
     RequestSender,
@@ -77,26 +78,30 @@ class Engine:
         finger: str = "",
     ) -> None:
         self._resume_from, self._patience = resume_from, patience
+        process = resume_process(resume_from) if resume_from else None
+        first = Requested().changing(setup=setup or Setup(), finger=finger)
+        self._begin(process.info.requested if process else first, process)
+
+    def _begin(self, first: Requested, process: ResumedProcess | None = None) -> None:
+        """Start a process with what is requested at `first`, or resume one."""
         self._deaths: list[float] = []
         self._seen, self._polled = Status(), time.monotonic()
         self.silent = 0.0
         """For how long in s an engine that streams has not reported, as far as it was polled."""
         self._process: BaseProcess | ResumedProcess | None = None
         self.resumed: ResumeInfo | None = None
+        self._borrows = process is not None  # its memory
         self._in_use = Requested()  # as it was before the newest source was requested
-        process = resume_process(resume_from) if resume_from else None
-        if process is None:
-            first = Requested().changing(setup=setup or Setup(), finger=finger)
-            self._requests = RequestSender(first)
-            self._ring, self._compared_ring = Ring.pair()
-            try:
-                self._start(Status(setup=self.requested.setup))
-            except BaseException:
-                self._release_memory()
-                raise
-        else:
-            self._requests = RequestSender(process.info.requested)
+        self._requests = RequestSender(first)
+        if process is not None:
             self._resume(process)
+            return
+        self._ring, self._compared_ring = Ring.pair()
+        try:
+            self._start(Status(setup=first.setup))
+        except BaseException:
+            self._release_memory()
+            raise
 
     @property
     def requested(self) -> Requested:
@@ -115,23 +120,34 @@ class Engine:
         with starting_process() as context:
             theirs, ours = multiprocessing.Pipe(duplex=False)
             self._process = context.Process(
-                target=serve,
-                args=(theirs, names, self._resume_from, self._patience),
+                target=self._serve,
+                args=(theirs, names, *self._serves_with()),
                 name="kappaskin-engine",
                 daemon=True,
             )
             self._process.start()
         theirs.close()
-        self._requests.connect(cast("Connection[Update, Any]", ours))
+        self._requests.connect(cast("Connection[Update, Any]", ours), self._known())
+
+    _serve: Callable[..., None] = staticmethod(serve)
+    """What the process runs, with the line of requests, the names of the rings and more."""
+
+    def _serves_with(self) -> tuple[object, ...]:
+        return self._resume_from, self._patience
+
+    def _known(self) -> int:
+        """The number of the request that the process begins with."""
+        return 0
 
     def _start_again(self, *events: Event) -> None:
         """Start another process, which continues the counts: no generation is used twice."""
         self._reap()
         # One killed while it wrote left no status that can be read.
         was = self._ring.read_status() or self._seen
-        if self.resumed is not None:
+        if self._borrows:
             self._release_memory()
             self._ring, self._compared_ring, self.resumed = *Ring.pair(), None
+            self._borrows = False
         setup, source = self.requested.setup, self.requested.source
         fresh = Status(
             setup=setup,
@@ -170,6 +186,11 @@ class Engine:
     def given_up(self) -> bool:
         """Whether the process has died so often that it is not restarted; `status` says so."""
         return len(self._deaths) >= _DEATHS
+
+    @property
+    def engines(self) -> "dict[str, Engine]":
+        """Itself, without a name: those of a hand of one."""
+        return {"": self}
 
     @property
     def source(self) -> str | None:
@@ -306,6 +327,28 @@ class Engine:
             )
         self._requests.act(Note(text))
 
+    def request(self, settings: Mapping[str, Any], actions: Iterable[Action] = ()) -> int:
+        """Request settings of `Requested` and actions; the number that `status` then reports."""
+        if settings:
+            self._requests.change(**settings)
+        for action in actions:
+            self._requests.act(action)
+        return self.requested.number
+
+    def newest_records(self, status: Status) -> tuple[int, Any, Any] | None:
+        """The newest estimate of the generation in `status`, as its number and its record.
+
+        And that of the same frame with the other setup, None without one.
+        """
+        found = self._ring.newest(status.generation, status.slot) if status.slot else None
+        if found is None:
+            return None
+        other, also = status.compared, None
+        if other is not None and other.slot is not None:
+            frame = int(found[1]["sequence"])
+            also = self._compared_ring.newest(other.generation, other.slot, frame)
+        return *found, also and also[1]
+
     def status(self) -> Status:
         # While one is being written there is none to read: then the last one is used.
         read, was = self._ring.read_status() or self._seen, self._seen
@@ -352,7 +395,7 @@ class Engine:
     @property
     def rings(self) -> tuple[Callable[[str], Ring], str, str]:
         """For `difference_errors`: how a process opens the memory of both, and its names."""
-        opened = Ring.attach if self.resumed is None else Ring.borrow
+        opened = Ring.borrow if self._borrows else Ring.attach
         return opened, self._ring.name, self._compared_ring.name
 
     def __enter__(self) -> "Engine":
@@ -374,10 +417,10 @@ class Engine:
 
     def _release_memory(self) -> None:
         for ring in (self._ring, self._compared_ring):
-            if self.resumed is None:
-                ring.destroy()
-            else:
+            if self._borrows:
                 ring.close()  # the resumed process releases it
+            else:
+                ring.destroy()
 
     def close(self) -> None:
         """End the process and release the memory."""
@@ -412,9 +455,13 @@ class Fingers:
         played = (source.startswith(ReplayedSource.SCHEME) for source in sources.values())
         self._opening = len(sources) > 1 and all(played)
 
-    def record(self, path: Path) -> None:
-        """Record all fingers to one file from now on; a `Refusal` where there can be none."""
-        self._recorder = HandRecorder(path.absolute(), tuple(self.engines))
+    def record(self, to: Path | HandRecorder) -> None:
+        """Record all fingers to one file from now on; a `Refusal` where there can be none.
+
+        Or by a recorder that has been made elsewhere, as in a thread: that takes a while.
+        """
+        made = to if isinstance(to, HandRecorder) else HandRecorder(to.absolute(), [*self.engines])
+        self._recorder = made
         for finger, engine in self.engines.items():
             engine.record(self._recorder.part(finger))
 

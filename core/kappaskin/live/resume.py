@@ -42,13 +42,14 @@ class ResumeInfo:
     """Information that an engine without a window sends to the window that resumes it.
 
     The state `requested` of it, the names of the `rings` that it writes to, its `pid`, and for how
-    long in s it has been `alone`.
+    long in s it has been `alone`. Of one on another machine, which has none of this, the `place`.
     """
 
     requested: Requested
     rings: tuple[str, str]
     pid: int
     alone: float
+    place: str = ""
 
     @property
     def lasted(self) -> str:

@@ -10,7 +10,8 @@ import os
 import pickle
 import secrets
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from functools import reduce
 from multiprocessing import resource_tracker
@@ -70,6 +71,19 @@ def _estimate(record: Any) -> Estimate:
     for n, kind in _RECORDS:
         values[n] = kind(*values[n])
     return Estimate(*values)
+
+
+def is_slot(slot: np.dtype[Any]) -> bool:
+    """Whether a type is that of the record of an estimate, of arrays of any lengths."""
+    types = {path: (of.kind, ()) for path, of in _STORED.items()}
+    ours = np.dtype([("opened", "u8"), *_fields(Estimate, "", types), ("closed", "u8")])
+    return _leaves(slot) == _leaves(ours)
+
+
+def _leaves(slot: np.dtype[Any]) -> list[Any]:
+    """The names of all fields in order, and the types of their numbers."""
+    inner = [(name, slot[name].base) for name in slot.names or ()]
+    return [(name, _leaves(each) if each.names else each) for name, each in inner]
 
 
 _Column = tuple[Callable[[Estimate], Any], Any]
@@ -229,11 +243,23 @@ class Ring:
 
     def write(self, estimate: Estimate) -> None:
         """Writer: put one estimate into the next slot."""
+        with self._writing() as place:
+            for value_of, column in self._columns:
+                column[place] = value_of(estimate)
+
+    def write_record(self, record: Any) -> None:
+        """Writer: put the record of an estimate, as `newest` has it, into the next slot."""
+        with self._writing() as place:
+            for name in self._slots.dtype.names[1:-1]:
+                self._slots[name][place] = record[name]
+
+    @contextmanager
+    def _writing(self) -> Generator[int]:
+        """The place of the next slot, which counts as written at the end."""
         written = int(self._header[self._WRITTEN])
         place = written % len(self._slots)
         self._opened[place] = written + 1
-        for value_of, column in self._columns:
-            column[place] = value_of(estimate)
+        yield place
         self._closed[place] = written + 1
         self._header[self._WRITTEN] = written + 1
 
@@ -244,6 +270,13 @@ class Ring:
 
         None when there is none yet, or no more.
         """
+        found = self.newest(generation, slot, sequence)
+        return _estimate(found[1]) if found is not None else None
+
+    def newest(
+        self, generation: int, slot: np.dtype[np.void], sequence: int | None = None
+    ) -> tuple[int, Any] | None:
+        """Reader: the same as the number of the estimate, counted from 1, and its record."""
         if not self._mapped(generation, slot):
             return None
 
@@ -258,10 +291,10 @@ class Ring:
             closed, record = here["closed"], here.copy()
             # The tickets in the order opposite to the writer's, or a half may pass for a whole.
             whole = closed == here["opened"] == ticket
-            return record if whole and self._header[self._GENERATION] == generation else None
+            same = self._header[self._GENERATION] == generation
+            return (ticket, record) if whole and same else None
 
-        record = _tried(copied)
-        return _estimate(record) if record is not None else None
+        return _tried(copied)
 
     def recent(
         self, generation: int, slot: np.dtype[np.void], after: int, paths: Sequence[str]

@@ -26,6 +26,35 @@ _EVENTS = 64  # last events in the status
 
 
 @dataclass(frozen=True)
+class LinkStatus:
+    """The connection to an engine on another machine, which listens at `place`.
+
+    `round_trip` in s is how long a message and its answer take, `age` in s how old estimates are
+    when they come, both as the median of the last ones, `shown` the share of the computed estimates
+    of the last seconds that came; NaN where none did. `cuts` counts how often it was lost.
+    """
+
+    place: str
+    round_trip: float = math.nan
+    age: float = math.nan
+    shown: float = math.nan
+    cuts: int = 0
+
+    @property
+    def words(self) -> str:
+        """The delay and the loss, as far as they are known."""
+        trip, age = (f"{1e3 * each:.0f} ms" for each in (self.round_trip, self.age))
+        parts = [f"{trip} there and back"] if math.isfinite(self.round_trip) else []
+        if math.isfinite(self.age):
+            parts.append(f"estimates {age} old when they come")
+        if math.isfinite(self.shown):
+            parts.append(f"{1 - self.shown:.0%} of them left out")
+        if self.cuts:
+            parts.append(f"lost {self.cuts} time{'s' if self.cuts > 1 else ''}")
+        return ", ".join(parts)
+
+
+@dataclass(frozen=True)
 class Status:
     """State of the engine.
 
@@ -47,7 +76,8 @@ class Status:
     `slope` is the largest of the newest shape, if the method neglects it though it matters
     (`Fit.neglected_slope`), else 0. `added_noise` is the standard deviation in 1/m of what is added
     to the readings of shown estimates, and only of these. `requested` is the number of the newest
-    request that the engine has received.
+    request that the engine has received. `link` is the connection to an engine on another machine,
+    None where it is on this one.
     """
 
     state: str = OFF
@@ -88,6 +118,7 @@ class Status:
     slope: float = 0.0
     added_noise: float = 0.0
     requested: int = 0
+    link: LinkStatus | None = None
 
     def after(self, events: Sequence[Event]) -> "Status":
         """The same status with `events` appended."""

@@ -1,8 +1,10 @@
 """Estimates to other programs: UDP, Foxglove."""
 
 from kappaskin.publish.access import THIS_MACHINE as THIS_MACHINE
+from kappaskin.publish.access import TOKEN as TOKEN
 from kappaskin.publish.access import Access as Access
 from kappaskin.publish.access import access_of as access_of
+from kappaskin.publish.access import token_of as token_of
 from kappaskin.publish.haptic_cue import Cue as Cue
 from kappaskin.publish.haptic_cue import CueGenerator as CueGenerator
 from kappaskin.publish.haptic_cue import CueLimits as CueLimits

@@ -23,6 +23,7 @@ TOKEN = "KAPPASKIN_TOKEN"
 """The variable of the environment that has the token; without it there is a new one each time."""
 
 _FORM = re.compile(r"[\w.~-]{16,128}", re.ASCII)
+_EXPECTED = "a token of 16 to 128 letters, digits and - . _ ~"
 _BYTES = 16  # of a new token
 _HOST = r"\[[0-9a-f:.]{2,45}\]|[\w.-]{1,253}"
 _AUTHORITY = re.compile(rf"({_HOST})(:[0-9]{{1,5}})?", re.ASCII)
@@ -69,6 +70,13 @@ def _token() -> str:
     return os.environ.get(TOKEN) or secrets.token_urlsafe(_BYTES)
 
 
+def token_of() -> tuple[str, bool]:
+    """The token of this process, and whether it was made; a `Refusal` for a short one."""
+    if not _FORM.fullmatch(token := _token()):
+        raise Refusal(f"expected {_EXPECTED} in {TOKEN}, got {len(token)} characters")
+    return token, not os.environ.get(TOKEN)
+
+
 @dataclass(frozen=True)
 class Denial:
     """The answer to a client that is refused: an HTTP `status`, and why, with the remedy."""
@@ -91,9 +99,9 @@ class AccessCheck:
     def __post_init__(self) -> None:
         if self.networked and not _FORM.fullmatch(self.access.token):
             raise Refusal(
-                f"other machines reach {self.host}, so expected a token of 16 to 128 letters, "
-                f"digits and - . _ ~ in {TOKEN}, got {len(self.access.token)} characters; without "
-                f"{TOKEN} in the environment a token is made"
+                f"other machines reach {self.host}, so expected {_EXPECTED} in {TOKEN}, got "
+                f"{len(self.access.token)} characters; without {TOKEN} in the environment a token "
+                "is made"
             )
 
     @property

@@ -22,22 +22,22 @@ CUE = (
     Number("sequence", "%d", "scan number of the estimate that is felt; null without one"),
     Number("age_s", "%.6f", "age of its data when this cue was sent; null without one"),
     Number("scale", "%.4f", "from 1 for new data to 0 for old or none"),
-    Number("force_N", "%.5g", "to be felt: 0 without a contact, and where it is not known"),
+    Number("force_N", "%.12g", "to be felt: 0 without a contact, and where it is not known"),
     Number("direction_x", "%.6f", "unit vector of the force: the inward normal of the skin"),
     Number("direction_y", "%.6f", "see direction_x"),
     Number("direction_z", "%.6f", "see direction_x"),
     Number("x_m", "%.6g", "position of the contact along the skin; null without one"),
     Number("y_m", "%.6g", "position of the contact across the skin"),
-    Number("curvature_1_per_m", "%.5g", "larger principal curvature of the skin at the contact"),
-    Number("curvature_2_per_m", "%.5g", "smaller principal curvature"),
+    Number("curvature_1_per_m", "%.12g", "larger principal curvature of the skin at the contact"),
+    Number("curvature_2_per_m", "%.12g", "smaller principal curvature"),
     Number("curvature_1_sd_per_m", "%.3g", "standard deviation of curvature_1_per_m"),
     Number("curvature_2_sd_per_m", "%.3g", "standard deviation of curvature_2_per_m"),
-    Number("slip_x_m_per_s", "%.5g", "velocity of the contact along the skin"),
-    Number("slip_y_m_per_s", "%.5g", "velocity of the contact across the skin"),
+    Number("slip_x_m_per_s", "%.12g", "velocity of the contact along the skin"),
+    Number("slip_y_m_per_s", "%.12g", "velocity of the contact across the skin"),
     Number("slip_x_sd_m_per_s", "%.3g", "standard deviation of slip_x_m_per_s"),
     Number("slip_y_sd_m_per_s", "%.3g", "standard deviation of slip_y_m_per_s"),
 )
-"""The numbers of a cue, in order."""
+"""The numbers of a cue, in order; with so many digits none is rounded to above a limit."""
 
 _TEMPLATE = template(CUE)
 _QUIET = 0.1  # s in which one with other limits fades, which sent to the same device
@@ -70,7 +70,7 @@ class CueSender:
         self._worst = 1.0, ""
         self._closed = False
         # No daemon: a process that ends lets the cue fade. The thread ends with the main one.
-        threading.Thread(target=self._run, name="cue-sender").start()
+        threading.Thread(target=self._run, name="cue-sender", daemon=False).start()
 
     @property
     def receivers(self) -> tuple[Receiver, ...]:

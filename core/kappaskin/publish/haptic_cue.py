@@ -207,7 +207,8 @@ class CueGenerator:
         """Seconds since the last cue; without an estimate from now on where they are in doubt."""
         now, slept = self._clock(), self._suspended()
         passed, asleep = now - self._last, slept - self._slept
-        self._last, self._slept = now, slept
+        # A pause between reading two clocks makes their difference smaller, and never larger.
+        self._last, self._slept = now, max(slept, self._slept)
         if asleep < _SUSPENDED:
             asleep = 0.0
         if passed < 0 or asleep:

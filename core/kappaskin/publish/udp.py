@@ -181,12 +181,12 @@ class UdpListener:
     def lines(self, message: JsonMessage) -> list[str]:
         """Lines for a message and for a gap before it; none where nothing new is to be shown."""
         lines, heard = list[str](), self._of(message)
-        if message["kind"] == "contact":
+        if message["kind"] in ("contact", "cue"):
             lines += self._gap(heard, message.get("number"))
             now = time.monotonic()
             if now - heard.shown >= _SHOWN:
                 heard.shown = now
-                lines.append(_words(message))
+                lines.append(_cue_words(message) if message["kind"] == "cue" else _words(message))
         elif message["kind"] == "status":
             state = f"{message.get('state')}  {message.get('sensor')}  {message.get('message')}"
             if state != heard.state:
@@ -242,7 +242,7 @@ def _understood(data: bytes) -> JsonMessage | None:
         return None
     message = cast("JsonMessage", message)
     kind, version = message.get("kind"), message.get("version")
-    known = kind in ("contact", "shape", "status") and version == VERSION
+    known = kind in ("contact", "shape", "status", "cue") and version == VERSION
     return message if known else None
 
 
@@ -255,6 +255,15 @@ def _number(message: JsonMessage, key: str) -> float:
 def _figure(message: JsonMessage, key: str, scale: float, how: str) -> str:
     value = _number(message, key)
     return "?" if math.isnan(value) else f"{scale * value:{how}}"
+
+
+def _cue_words(message: JsonMessage) -> str:
+    slip = ", ".join(_figure(message, f"slip_{axis}_m_per_s", 1e3, ".1f") for axis in "xy")
+    return (
+        f"cue       {message.get('state')}  force {_figure(message, 'force_N', 1, '.4f')} N  "
+        f"slip {slip} mm/s  scale {_figure(message, 'scale', 1, '.2f')}  "
+        f"age {_figure(message, 'age_s', 1e3, '.1f')} ms"
+    )
 
 
 def _words(message: JsonMessage) -> str:

@@ -18,7 +18,6 @@ from kappaskin.scenes.read import read_scene_text as read_scene_text
 from kappaskin.scenes.read import read_skin as read_skin
 from kappaskin.scenes.read import scene_file as scene_file
 from kappaskin.scenes.read import scene_of as scene_of
-from kappaskin.scenes.read import usual_reference as usual_reference
 from kappaskin.scenes.scene import AppliedLoads as AppliedLoads
 from kappaskin.scenes.scene import EffectSelection as EffectSelection
 from kappaskin.scenes.scene import LoadingHistory as LoadingHistory

@@ -17,6 +17,7 @@ from kappaskin.sources.diagnosis import WireMonitor as WireMonitor
 from kappaskin.sources.diagnosis import identified_ports as identified_ports
 from kappaskin.sources.information import sensor_from_json as sensor_from_json
 from kappaskin.sources.information import sensor_to_json as sensor_to_json
+from kappaskin.sources.inputs import Datagrams as Datagrams
 from kappaskin.sources.inputs import EndOfInput as EndOfInput
 from kappaskin.sources.inputs import Input as Input
 from kappaskin.sources.interpreter import Interpreter as Interpreter

@@ -83,8 +83,9 @@ class Datagrams(Input):
                 "program that has it"
             ) from error
 
-    def arriving(self) -> tuple[float, bytes]:
-        came = select.select([self._socket], [], [], _WAIT)[0]
+    def arriving(self, within: float = _WAIT) -> tuple[float, bytes]:
+        """What arrived and when, after `within` s at most."""
+        came = select.select([self._socket], [], [], within)[0]
         return self._clock(), self._socket.recv(_BLOCK) if came else b""
 
     def close(self) -> None:

@@ -1,5 +1,9 @@
 """The file of a hand, and where its fingers are."""
 
+import math
+import socket
+import time
+from contextlib import closing
 from importlib.resources import files
 from pathlib import Path
 
@@ -8,7 +12,16 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from kappaskin import Refusal
-from kappaskin.hand import Linkage, angles_from_json, is_hand, load_hand, named_hand, placement
+from kappaskin.hand import (
+    JointReceiver,
+    Linkage,
+    angles_from_json,
+    is_hand,
+    load_hand,
+    named_hand,
+    placement,
+)
+from kappaskin.sources import VirtualClock
 
 READY = Path(str(files("kappaskin_resources"))) / "hands" / "three-fingertips.toml"
 
@@ -161,7 +174,9 @@ def test_another_source_names_no_hand(source):
 
 
 def test_a_hand_that_is_not_ready_is_refused_with_those_that_are():
-    with pytest.raises(Refusal, match=r"a hand among .*three-fingertips.*, or a file; got 'mine'"):
+    with pytest.raises(
+        Refusal, match=r"a hand among .*three-fingertips, or a file that .*; got 'mine'"
+    ):
         named_hand("hand:mine")
 
 
@@ -169,3 +184,34 @@ def test_a_scene_or_a_file_that_cannot_be_read_is_no_hand(tmp_path):
     assert is_hand(READY)
     assert not is_hand(READY.parents[1] / "scenes" / "demo.toml")
     assert not is_hand(tmp_path / "none.toml")
+
+
+def test_angles_come_by_udp_and_what_is_none_is_counted():
+    with closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    clock = VirtualClock(10.0)
+    with (
+        closing(JointReceiver(f"udp://127.0.0.1:{port}", clock)) as joints,
+        closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as robot,
+    ):
+        assert (joints.angles, joints.age) == ({}, math.inf)
+        robot.connect(("127.0.0.1", port))
+        for data in (
+            b'{"base": 0.5, "tip": 0.1}',
+            b'{"base": 0.6}',
+            b'{"base": NaN}',
+            b"\xff",
+            b"[1]",
+        ):
+            robot.send(data)
+        until = time.monotonic() + 10.0
+        while joints.refused < 3 and time.monotonic() < until:
+            assert joints.angles is not None
+        assert joints.angles == {"base": 0.6, "tip": 0.1}
+        clock.sleep(2.0)
+        assert joints.age == pytest.approx(2.0)
+        with pytest.raises(Refusal, match="cannot listen there"):
+            JointReceiver(f"udp://127.0.0.1:{port}")
+    with pytest.raises(Refusal, match=r"expected udp://:PORT such as udp://:9870, got 'udp://:'"):
+        JointReceiver("udp://:")

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import socket
 import threading
 import time
@@ -14,7 +15,7 @@ import numpy as np
 import pytest
 
 from kappaskin import load_scene
-from kappaskin.publish import CueGenerator, CueLimits, SourceState
+from kappaskin.publish import CueGenerator, CueLimits, SourceState, UdpListener
 from kappaskin.publish import cue as transport
 from kappaskin.publish.cue import CUE, CueSender
 from kappaskin.publish.message import LARGEST, EstimateMessage
@@ -183,6 +184,22 @@ def test_its_status_tells_of_the_faintest_cue_since_the_last_one(receiver, sende
     feel(sender, message, 0.02)
     told = sender.cue
     assert (told.state, told.scale) == ("stale", 0)
+
+
+def test_listen_shows_a_cue_and_its_losses(receiver, sender, message: EstimateMessage) -> None:
+    with closing(UdpListener(_free_port())) as listener:
+        made = CueGenerator()
+        made.take(message.estimate)
+        said = dict(json.loads(sender.encoded(made())), number=7)
+        (shown,) = listener.lines(said)
+        assert re.search(r"s  thumb  cue       (live|late)  force 0\.\d{4} N  slip 0\.0, 0", shown)
+        assert "gap       2 messages lost" in listener.lines(said | {"number": 10})[0]
+
+
+def _free_port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as found:
+        found.bind(("", 0))
+        return found.getsockname()[1]
 
 
 @pytest.mark.parametrize(

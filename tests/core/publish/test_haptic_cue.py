@@ -152,6 +152,11 @@ def test_nothing_is_felt_after_a_suspension_nor_of_a_clock_that_went_back() -> N
     cue = bench.cue(1e-3)
     assert (cue.state, cue.scale, cue.force) == ("stale", 0, 0)
     bench.run(0.2)
+    bench.slept -= 0.1  # a pause between reading two clocks is no suspension
+    bench.cue()
+    bench.slept += 0.1
+    bench.feel()
+    assert bench.cue().scale == 1
     bench.now -= 50
     bench.cue()
     assert bench.run(FADE + 0.002, feels=False).force == 0

@@ -1,11 +1,13 @@
 """Connection: selection of the source of readings."""
 
+import math
 from pathlib import Path
 from threading import Event
 
 from PySide6.QtWidgets import QFileDialog
 
-from kappaskin.live import ResumeInfo
+from kappaskin._text import printable
+from kappaskin.live import SCHEME, ResumeInfo, Status
 from kappaskin.recording import Imported, ImportRequest, ImportTask, is_foreign
 from kappaskin.sources import (
     described_source,
@@ -23,7 +25,7 @@ from kappaskin_app.shell.opening import Kind
 from kappaskin_app.shell.pages import LIVE
 from kappaskin_app.shell.parts import FILE, SOURCE
 from kappaskin_app.shell.window import MainWindow
-from kappaskin_app.widgets.parts import ELLIPSIS
+from kappaskin_app.widgets.parts import ELLIPSIS, Label
 
 _SIMULATE = "Connect the simulated skin that the panels define"
 _CONNECT = "Connect the source selected under Connection"
@@ -53,7 +55,12 @@ class ConnectionFeature:
         )
         self._stopped, self._waiting = Event(), ""  # source that waits until the ports are closed
         self.connection.sources.identify_requested.connect(guarded(self._identify))
-        session.source_handlers.append(self._wait_for_ports)
+        session.source_handlers += [self._refuse_engine, self._wait_for_ports]
+        session.reported.connect(guarded(self._show_link))
+        self.link = Label()
+        self.link.setToolTip("The connection to the engine in another room.")
+        self.link.hide()
+        shell.display.status_bar.add(self.link)
         session.source_changed.connect(guarded(self.connection.show_source))
         session.source_refused.connect(guarded(self.connection.show_refusal))
         session.reasons.append(self.connection.message)
@@ -97,6 +104,19 @@ class ConnectionFeature:
         """Show the requested source, which is not read while a resumed recording uses another."""
         self.connection.show_source(source)
         self.port_search.refresh()
+
+    def _refuse_engine(self, source: str) -> bool:
+        """Say how an engine in another room is opened: a window is of one engine."""
+        if source.startswith(SCHEME):
+            command = f"`kappaskin app --source {source}`"
+            self.connection.show_refusal(f"An engine has a window of its own: {command}.")
+        return source.startswith(SCHEME)
+
+    def _show_link(self, status: Status) -> None:
+        """Show the delay of the connection in the status bar."""
+        if (link := status.link) is not None and math.isfinite(link.round_trip):
+            self.link.setText(f"{printable(link.place)}: {1e3 * link.round_trip:.0f} ms")
+        self.link.setVisible(link is not None)
 
     def _identify(self) -> None:
         """Find out what speaks at each port that is not in use here."""

@@ -217,7 +217,7 @@ class ConnectionPanel(Panel):
         super().__init__("Connection")
         self._ports: list[Port] = []
         self._selected: Port | None = None  # the selected port, listed or not
-        self._next_losses = 0.0
+        self._next_losses = self._next_link = 0.0
         self._speakers: list[tuple[Port, str]] = []  # ports, and the devices last connected there
         self._refusal, self._connecting = "", ""
         self.sources = SourceBox()
@@ -235,6 +235,12 @@ class ConnectionPanel(Panel):
         self.disconnect_button.setObjectName("disconnect")
         self.device, self.losses = Label(wordWrap=True), Label(wordWrap=True)  # pyright: ignore[reportCallIssue]
         self.losses.setToolTip("Messages lost and bytes discarded since the source was connected.")
+        self.link = Label(wordWrap=True)  # pyright: ignore[reportCallIssue]
+        self.link.setToolTip(
+            "The connection to the engine in another room: how long a message and its answer take, "
+            "how old estimates are when they come, and how many the connection did not take. A "
+            "recording at the engine has all."
+        )
         self.copy_button = QPushButton("Copy the command")
         self.copy_button.setToolTip("Copy the command in the message above, for a terminal.")
         self.copy_button.clicked.connect(self._copy_command)
@@ -255,6 +261,7 @@ class ConnectionPanel(Panel):
         self.body.addWidget(self.new_button)
         self.body.addWidget(self.device)
         self.body.addWidget(self.losses)
+        self.body.addWidget(self.link)
         self._around.addWidget(self.copy_button, alignment=Qt.AlignmentFlag.AlignRight)
         pass_window_keys(self.sources)
         self._list()
@@ -385,6 +392,7 @@ class ConnectionPanel(Panel):
         self._connecting = status.connecting
         self._show_message(status)
         self._show_losses(status)
+        self._show_link(status)
         self.disconnect_button.setEnabled(status.state != "off")
         self.disconnect_button.setText("Cancel" if status.connecting else "Disconnect")
         self.disconnect_button.setToolTip(
@@ -413,6 +421,15 @@ class ConnectionPanel(Panel):
             self._next_losses = now + _LOSSES_PERIOD
             self.losses.setText(f"{status.accounting.words}.")
         self.losses.setVisible(counted and sensor is not None)
+
+    def _show_link(self, status: Status) -> None:
+        """Update the state of a connection to another room as often as the losses."""
+        now, link = time.monotonic(), status.link
+        if link is not None and now >= self._next_link:
+            self._next_link = now + _LOSSES_PERIOD
+            words = link.words or "connecting"
+            self.link.setText(f"Engine at {printable(link.place)}: {words}.")
+        self.link.setVisible(link is not None)
 
     def show_message(self, text: str, hint: bool = False) -> None:
         super().show_message(text, hint)

@@ -11,10 +11,11 @@ from kappaskin_app.features.lessons.pointing import ControlPointer
 from kappaskin_app.features.lessons.teaching import Teaching
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.form import Form
+from kappaskin_app.shell.opening import Kind
 from kappaskin_app.shell.parts import HELP
 from kappaskin_app.shell.window import MainWindow
 
-_ABOUT = "Lessons of ten to fifteen minutes, from the curvature gage to faults of a sensor"
+_ABOUT = "Lessons of ten to fifteen minutes, from the curvature gage to a hand that rolls a rod"
 _TEACHER = "Of each lesson: goal, time, answers, common mistakes, questions to discuss"
 
 
@@ -40,6 +41,7 @@ class LessonsFeature:
         )
         self.pointing = ControlPointer(self._forms, self._places, docks.reveal, shell)
         self.lesson.bind(self.teaching)
+        shell.opening.add(Kind("lesson", (".md",), self.teaching.open_file))
         teacher = partial(shell.guide_requested.emit, "teach")
         self.lesson.list.teacher_wanted.connect(guarded(teacher))
         shell.actions_by_name.add("teacher", HELP, "&Teacher's page", teacher, "", _TEACHER)
@@ -50,7 +52,7 @@ class LessonsFeature:
         shell.menus.welcome.add(
             3,
             "&Begin a lesson",
-            "Eleven lessons, from the curvature gage to faults of a sensor.",
+            "Fourteen lessons, from the curvature gage to a hand that rolls a rod.",
             lambda: docks.reveal("lesson"),
         )
 

@@ -97,13 +97,14 @@ class Step:
 
 @dataclass(frozen=True)
 class Lesson:
-    """A lesson of about so many `minutes`, in steps."""
+    """A lesson of about so many `minutes`, in steps; on a ready `hand` where one is named."""
 
     name: str
     title: str
     minutes: int
     learn: str
     steps: tuple[Step, ...]
+    hand: str = ""
 
     def begins(self, step: int) -> Mapping[str, Any] | None:
         """The settings that `step` begins with, from it or the last step that has any."""

@@ -2,7 +2,7 @@
 
 import re
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, fields
 from importlib.resources import files
@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 
 from kappaskin._files import open_file
 from kappaskin.errors import Refusal
+from kappaskin.hand import HANDS
 from kappaskin.pipeline import REPORTED
 from kappaskin.scenes import SCENES
 from kappaskin_app.features.lessons.expression import NUMBER, TRUTH, Expression, expression
@@ -89,7 +90,7 @@ _FOLDER = Path(str(files("kappaskin_resources"))) / "lessons"
 READY = tuple(sorted(_FOLDER.glob("[0-9]*.md")))
 """The files of the lessons that come with the program, in their order."""
 
-DOCKS = ("curvature", "cost", "stability", "scene", "health", "compare")
+DOCKS = ("curvature", "cost", "stability", "scene", "health", "compare", "hand")
 _NUMBERS = (each.header.key for each in REPORTED if each.header is not None)
 READOUTS = tuple(f"readout-{name}" for name in ("rate", "contact", *_NUMBERS))
 _PLACES = {*DOCKS, *READOUTS, *SETTABLE}
@@ -103,7 +104,7 @@ _BLOCK = re.compile(r"^```toml\n(.*?)^```[ \t]*$", re.DOTALL | re.MULTILINE)
 _FOREIGN = re.compile(r"!\[|<[a-zA-Z/!?]")  # Qt would read the files that these name
 _AT_LINE = re.compile(r"\(at line (\d+), column \d+\)")
 
-_HEAD_KEYS = {"format", "title", "minutes", "learn", "set"}
+_HEAD_KEYS = {"format", "title", "minutes", "learn", "set", "hand"}
 _QUESTION_KEYS = {"question", "hint", "explain"}
 _WAYS = {
     "choices": {"choices", "right"},
@@ -148,6 +149,7 @@ def lesson_of(text: str, name: str) -> Lesson:
     if table.get("format", int) != _FORMAT:
         raise table.refusal("format", f"{_FORMAT}, which this version reads")
     usual = table.settings("set")
+    hand = table.one_of("hand", HANDS)
     begins = list(_STEP.finditer(text, head.end()))
     if not 1 <= len(begins) <= _STEPS:
         raise Refusal(
@@ -161,12 +163,18 @@ def lesson_of(text: str, name: str) -> Lesson:
         _step(name, match[1].strip(), text, match.end(), end, usual)
         for match, end in zip(begins, ends, strict=True)
     )
+    if hand and (usual or any(step.buttons or step.sets is not None for step in steps)):
+        raise Refusal(
+            f"{name}: expected a lesson on a hand without set, scene and button, got some; leave "
+            "them out: they change the simulated skin, and a hand has its own"
+        )
     return Lesson(
         name,
         table.words("title"),
         table.within("minutes", 1, 120),
         table.words("learn"),
         steps,
+        hand,
     )
 
 
@@ -341,10 +349,15 @@ class _Table:
 
     def placed(self) -> dict[str, Any]:
         """The settings of a step or a button, and the ready scene among them."""
-        scene = self.get("scene", str, "")
-        if "scene" in self.values and scene not in SCENES:
-            raise self.refusal("scene", f"one of {', '.join(SCENES)}")
+        scene = self.one_of("scene", SCENES)
         return self.settings("set") | ({"scene": scene} if scene else {})
+
+    def one_of(self, key: str, names: Collection[str]) -> str:
+        """One of these names, or nothing where the key is left out."""
+        name = self.get(key, str, "")
+        if key in self.values and name not in names:
+            raise self.refusal(key, f"one of {', '.join(names)}")
+        return name
 
     def places(self) -> tuple[str, ...]:
         """The controls that are pointed at."""

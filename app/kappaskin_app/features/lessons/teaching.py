@@ -18,7 +18,7 @@ from kappaskin_app.features.lessons.lesson_file import READY, read_lesson
 from kappaskin_app.features.lessons.progress import Progress
 from kappaskin_app.features.lessons.sheets import sheet, write_hand_out
 from kappaskin_app.guard import guarded
-from kappaskin_app.shell.background import BackgroundTask, Tasks
+from kappaskin_app.shell.background import BackgroundTask, Tasks, open_another_window
 from kappaskin_app.shell.display import Display
 from kappaskin_app.shell.folders import proposed, recordings_folder
 from kappaskin_app.shell.history import History
@@ -115,8 +115,12 @@ class Teaching(QObject):
         self.take(str(file))
 
     def take(self, file: str) -> None:
-        """Start the lesson in `file`, or continue it."""
+        """Start the lesson in `file`, or continue it; one on a hand in a window on that hand."""
         progress = self.taken[file]
+        if (hand := progress.lesson.hand) and not self._session.source.startswith(f"hand:{hand}#"):
+            open_another_window(file, "--source", f"hand:{hand}")
+            self.notified.emit(f"{progress.lesson.title}: it opens in a window of its hand.")
+            return
         self._go(progress, 0 if progress.at_end else progress.step)
 
     def leave(self) -> None:
@@ -171,7 +175,8 @@ class Teaching(QObject):
         self.pointed.emit(progress.lesson.steps[place.step].point if progress and at_work else ())
         self.changed.emit()
         if left and progress is not None:
-            self._simulate()
+            if not progress.lesson.hand:
+                self._simulate()
             self.taken_up.emit()
 
     def answer(self, given: str) -> None:

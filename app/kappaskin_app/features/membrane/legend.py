@@ -7,10 +7,9 @@ from PySide6.QtGui import QColor, QIcon, QImage, QPainter, QPen, QPixmap
 from PySide6.QtWidgets import QToolButton, QWidget
 
 from kappaskin_app.features.membrane.loads import LOAD
-from kappaskin_app.features.membrane.membrane import CONTACT
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.settings import Settings, form_field
-from kappaskin_app.theme import Colours, current, follow_look
+from kappaskin_app.theme import CONTACT, Colours, current, follow_look
 from kappaskin_app.widgets.layout import Flow
 from kappaskin_app.widgets.lettering import read_from_afar
 

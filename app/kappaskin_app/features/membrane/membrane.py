@@ -32,14 +32,21 @@ from kappaskin_app.features.membrane.mouse import LoadDrag, SurfacePointer
 from kappaskin_app.features.membrane.surface import WHOLE, Box, GridLines, Shares, Surface
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.drawn_skin import DrawnSkin
-from kappaskin_app.theme import DARK_INK, LIGHT_INK, OUT, WANTED, Colours, current, follow_look
+from kappaskin_app.theme import (
+    CONTACT,
+    DARK_INK,
+    LIGHT_INK,
+    OUT,
+    WANTED,
+    Colours,
+    current,
+    follow_look,
+)
 
 _LETTERS = 14  # px, of the caption
 _CORNER = 15  # letters at its right: the vertical exaggeration, and which error bars are drawn
 _LIFT = 0.006  # of the skin's size above the surface, which would hide half of a line
 _POINT, _POINTS = 5, 80  # px of an element, and of many in a row: or they would hide the skin
-CONTACT = "#1fd17a"
-"""The colour of what is estimated of the contact."""
 _PIN = 0.3  # of the skin's size, length of the mark of a contact
 _LATER = 20  # ms after a change of the look
 _FITTED, _TRUE = (8, 0), (16, 8)  # lines drawn: every so many, from which one on

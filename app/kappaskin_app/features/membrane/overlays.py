@@ -13,12 +13,12 @@ from kappaskin.mechanics import PlacedObject
 from kappaskin.scenes import Indenter
 from kappaskin_app.features.membrane.annotations import UNLIT, pixels
 from kappaskin_app.features.membrane.loads import LOAD
-from kappaskin_app.features.membrane.membrane import CONTACT, MembraneView
+from kappaskin_app.features.membrane.membrane import MembraneView
 from kappaskin_app.shell.colouring import Colouring, SteadyRange
 from kappaskin_app.shell.drawn_skin import MM, DrawnSkin
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings
-from kappaskin_app.theme import DIVERGING
+from kappaskin_app.theme import CONTACT, DIVERGING
 from kappaskin_app.widgets.text import Coverage
 
 _COLOUR = "#8fd0ff"

@@ -192,6 +192,7 @@ class PresenterController(QObject):
         else:
             # Recorded data has a time in the recording, and no age.
             age = "" if state == GAP else age_in_words(now - status.last_frame)
+            latency = ""
             since = self._session.alarm().partition("\n")[0].removeprefix(state).strip()
             self.view.show_trouble(state, since, status.message.replace("`", ""))
         self._show_estimate(now)  # a paused recording, or a gap, emits no estimate

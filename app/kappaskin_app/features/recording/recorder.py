@@ -111,7 +111,7 @@ class RecordingControl(QObject):
     ) -> None:
         super().__init__(window)
         self._session, self._banner, self._window = session, banner, window
-        self._replays = False
+        self._replays, self._elsewhere = False, ""  # the place of an engine in another room
         self.written = RecordingStatus()
         self.message, self.alarming = "", False
         self.damaged: Path | None = None
@@ -179,8 +179,8 @@ class RecordingControl(QObject):
             self._session.engine.note(text.strip())
 
     def may_close(self) -> bool:
-        """Whether the window may close; asks first while recording."""
-        if not self.recording:
+        """Whether the window may close; asks first while recording here."""
+        if not self.recording or self._elsewhere:
             return True
         if self._question is None:
             self._question = self._close_question()
@@ -269,6 +269,7 @@ class RecordingControl(QObject):
     def follow(self, status: Status) -> None:
         """Take the state of the recording from the status."""
         was, self.written = self.written, status.recording
+        self._elsewhere = status.link.place if status.link else ""
         turned, self._replays = self._replays, status.replay is not None
         self._show_actions()
         if (now := self.written) == was:
@@ -281,8 +282,11 @@ class RecordingControl(QObject):
             self.notified.emit(now.trouble)
             self._offer_way_out(now, part)
         elif was.active and not now.active:
-            words = f"Recorded {elapsed(now.seconds)}, {file_size(now.size)}:"
-            self._offer(Path(now.path), words)
+            words = f"Recorded {elapsed(now.seconds)}, {file_size(now.size)}"
+            if self._elsewhere:
+                self._set_message(f"{words}: {now.path} at {self._elsewhere}.", alarming=False)
+            else:
+                self._offer(Path(now.path), f"{words}:")
         self.changed.emit()
 
     def _offer_way_out(self, now: RecordingStatus, part: Path) -> None:

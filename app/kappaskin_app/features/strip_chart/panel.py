@@ -36,6 +36,10 @@ _RECORDED_TIP = (
 )
 _ELEMENT, _DIGITS = "element-", 6
 _SPAN_TIP = "Time that is shown."
+_ALL_TIP = (
+    "A curve of each finger of the hand, on the clock of this computer. The band is the error bar "
+    "of the finger that is shown, of which elements and the object are too."
+)
 
 
 def _principal(form: Array) -> Array:
@@ -168,6 +172,11 @@ class StripChart(QWidget):
         self.when = Label()
         self._above.addWidget(self.when)
         self._above.addWidget(self.span)
+        self.of_hand = False
+        self.all_fingers = QCheckBox("All fingers")
+        self.all_fingers.setToolTip(_ALL_TIP)
+        self.all_fingers.setChecked(True)
+        self._above.addWidget(self.all_fingers)
         for name in QUANTITIES:
             self._add_box(name)
         self._around = QVBoxLayout(self)
@@ -207,6 +216,7 @@ class StripChart(QWidget):
             box.setChecked(name in names)
         self.span.setCurrentIndex(self.span.findData(seconds))
         self.span.setVisible(not length)
+        self.all_fingers.setVisible(self.of_hand and not length)
         bars = Coverage.now
         if self._shown == (names, seconds, length, bars):
             return
@@ -254,13 +264,37 @@ class StripChart(QWidget):
 
         The times are from `zero` in s on.
         """
+        self._draw(name, self._series(name, "", 0, span, sd, zero), zero, marks)
+
+    def show_fingers(
+        self,
+        name: str,
+        spans: Mapping[str, tuple[Span, float]],
+        shown: str,
+        sd: Span | None,
+        marks: Sequence[StripMark],
+    ) -> None:
+        """Draw a quantity of each finger, each with the time from which its times are.
+
+        The standard deviation and the marks are those of the finger that is `shown`.
+        """
+        series: list[Series] = []
+        for number, (finger, (span, zero)) in enumerate(spans.items()):
+            of = sd if finger == shown else None
+            series += self._series(name, finger, number, span, of, zero)
+        self._draw(name, series, spans[shown][1], marks)
+
+    def _series(
+        self, name: str, label: str, colour: int, span: Span, sd: Span | None, zero: float
+    ) -> list[Series]:
+        """The curve of a quantity, and the band of its standard deviation, at times from `zero`."""
         scale, each = QUANTITIES[name].scale, self._unit
         times, values = span.outline
-        shown = [Series("", (times - zero) / each, scale * values)]
+        found = [Series(label, (times - zero) / each, scale * values, colour)]
         if sd is not None:
             ago, mean = (span.times - zero) / each, scale * span.mean
-            shown.append(Series("", ago, mean, line="", band=scale * sd.mean))
-        self._draw(name, shown, zero, marks)
+            found.append(Series("", ago, mean, colour, line="", band=scale * sd.mean))
+        return found
 
     def show_element(
         self, name: str, spans: Sequence[Span], zero: float, marks: Sequence[StripMark]

@@ -2,6 +2,7 @@
 
 import math
 import time
+from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -15,7 +16,7 @@ from PySide6.QtWidgets import QApplication, QWidget
 from kappaskin.contact import ContactObject
 from kappaskin.estimation import Region
 from kappaskin.frames import Array, Estimate, Event
-from kappaskin.live import Status
+from kappaskin.live import Engine, Status
 from kappaskin.recording import Replay, contacts_in
 from kappaskin.sensing import SHOWN_UNITS
 from kappaskin_app.features.strip_chart.history import Bins, Span, StripHistory, broken
@@ -47,7 +48,7 @@ _NEARLY = 0.2  # s between the time of an estimate and that reported by the engi
 _SHORTEST = 1e-3  # s of a recording
 _MOST_EVENTS = 50  # of a recording that are marked
 _OF_FRAMES = {name: of for name, of in QUANTITIES.items() if of.path}
-_NEAR_RIM = "contact.near_rim"
+_NEAR_RIM, _HOST_TIME = "contact.near_rim", "host_time"
 _PATHS = sorted({p for of in _OF_FRAMES.values() for p in (of.path, of.sd) if p} | {_NEAR_RIM})
 _SDS = [(name, True) for name, of in _OF_FRAMES.items() if of.sd]
 _COLUMNS = {each: n for n, each in enumerate([*((name, False) for name in _OF_FRAMES), *_SDS])}
@@ -109,8 +110,37 @@ class Dragging(QObject):
         drag.exec(Qt.DropAction.CopyAction)
 
 
+class _Frames:
+    """The numbers of every estimate of a finger, as they are read from its engine.
+
+    Its clock is `ahead` s of that of this machine.
+    """
+
+    def __init__(self) -> None:
+        self.history, self.ahead = StripHistory(len(_COLUMNS)), math.nan
+        self.key, self._number = (0, 0), 0
+
+    def read(self, engine: Engine, status: Status, more: Sequence[str] = ()) -> list[Array]:
+        """Store the numbers of new estimates; their times (T,), then what they have at `more`."""
+        key = status.connections, status.generation
+        if key != self.key:
+            if key[0] != self.key[0]:
+                self.history.clear()
+            self.key, self._number = key, 0
+        paths = [*_PATHS, _HOST_TIME, *more]
+        times, values, self._number = engine.recent(status, self._number, paths)
+        if not len(times):
+            return []
+        self.history.append(times, _columns(dict(zip(paths, values, strict=True))))
+        self.ahead = float(times[-1] - values[len(_PATHS)][-1])
+        return [times, *values[len(_PATHS) + 1 :]]
+
+
 class Strips(QObject):
-    """Keeps the numbers of every estimate, and draws those selected in its `panel`."""
+    """Keeps the numbers of every estimate, and draws those selected in its `panel`.
+
+    Of a hand it keeps those of all fingers.
+    """
 
     def __init__(
         self,
@@ -123,12 +153,14 @@ class Strips(QObject):
         super().__init__(display)
         self._history, self._session, self._display = history, session, display
         self.panel = StripChart()
-        self._frames, self._objects = StripHistory(len(_COLUMNS)), StripHistory(1)
+        self._fingers, self._objects = defaultdict[str, _Frames](_Frames), StripHistory(1)
         self._elements: dict[str, StripHistory] = {}
         self._element = -1
-        self._ahead = self._zero = math.nan
-        """Device's clock minus that of this machine, and minus the time in a recording, in s."""
-        self._key, self._last_number, self._next, self._next_read = (0, 0), 0, 0.0, 0.0
+        self._zero = math.nan
+        """Device's clock minus the time in a recording, in s."""
+        self._connection, self._next, self._next_read = 0, 0.0, 0.0
+        self.panel.of_hand = session.fingers is not None
+        self.panel.all_fingers.clicked.connect(guarded(lambda *_: self._draw()))
         self._recorded, self._length, self._last = _bins(1.0), 0.0, 0.0
         self._reading = BackgroundTask(tasks, "Reading the contacts", self._take_recorded)
         session.estimated.connect(guarded(self.receive))
@@ -222,28 +254,28 @@ class Strips(QObject):
     def receive(self, estimate: Estimate) -> None:
         """Store the numbers of new estimates, before the engine drops them."""
         status, now = self._session.status, time.monotonic()
-        key = status.connections, estimate.generation
-        if now < self._next_read and key == self._key:
+        frames = self._fingers[self._session.finger]
+        if now < self._next_read and (status.connections, estimate.generation) == frames.key:
             return
         self._next_read = now + min(_PERIOD, _UNREAD / max(status.rate, 1.0))
-        if key != self._key:
-            if key[0] != self._key[0]:
-                for history in (self._frames, self._objects, *self._elements.values()):
-                    history.clear()
-            self._key, self._last_number = key, 0
+        if status.connections != self._connection:
+            self._connection = status.connections
+            for history in (self._objects, *self._elements.values()):
+                history.clear()
         elements = list(self._elements) if status.sensor is not None else []
-        paths = [*_PATHS, *["curvature"] * bool(elements)]
-        engine = self._session.engine
-        times, values, self._last_number = engine.recent(status, self._last_number, paths)
-        if not len(times):
-            return
-        self._frames.append(times, _columns(dict(zip(paths, values, strict=True))))
-        self._ahead = estimate.device_time - estimate.host_time
-        if elements and status.sensor is not None:
-            read = values[-1]
+        found = frames.read(self._session.engine, status, ["curvature"] * bool(elements))
+        if found and elements and status.sensor is not None:
+            times, read = found
             read = read if read.ndim == 3 else status.sensor.layout.by_kind(read)
             for name in elements:
                 self._elements[name].append(times, read[:, :, element_of(name)])
+
+    def _read_others(self) -> None:
+        """Store the numbers of new estimates of the fingers that are not shown."""
+        for finger in self._session.fingers.engines if self._session.fingers else ():
+            if finger != self._session.finger:
+                status = self._session.status_of(finger)
+                self._fingers[finger].read(self._session.engine_of(finger), status)
 
     def _open(self, source: str) -> None:
         """Begin with another source: read the contacts of a recording."""
@@ -269,6 +301,7 @@ class Strips(QObject):
     def follow(self, status: Status) -> None:
         """Draw what is selected, some times a second."""
         now = time.monotonic()
+        self._read_others()
         if now >= self._next and self.panel.isVisible():
             self._next = now + _PERIOD
             if self._length:
@@ -283,23 +316,48 @@ class Strips(QObject):
         self._objects.append(np.array([estimate.device_time]), np.array([[radius]]))
 
     def _draw(self) -> None:
-        until, seconds = self._frames.last, self._history.settings.strip_seconds
+        shown = self._fingers[self._session.finger]
+        until, seconds = shown.history.last, self._history.settings.strip_seconds
         if not math.isfinite(until):
             return
         begin = until + (self.panel.part[0] if self.panel.part else -seconds)
-        marks = _marks(self._session.status.events, self._ahead)
+        marks = _marks(self._session.status.events, shown.ahead)
         for name in self.panel.charts:
-            sd = None
             if name in self._elements:
                 self._draw_element(name, begin, until, marks)
-                continue
-            if name == RADIUS:
-                span = self._objects.span(0, begin, _PARTS)
+            elif name == RADIUS:
+                self.panel.show_span(name, self._objects.span(0, begin, _PARTS), None, until, marks)
+            elif self._session.fingers is not None and self.panel.all_fingers.isChecked():
+                self._draw_fingers(name, begin - until, until, marks)
             else:
-                span = self._frames.span(_COLUMNS[name, False], begin, _PARTS)
-                if (name, True) in _COLUMNS:
-                    sd = self._frames.span(_COLUMNS[name, True], begin, _PARTS)
-            self.panel.show_span(name, span, sd, until, marks)
+                span = shown.history.span(_COLUMNS[name, False], begin, _PARTS)
+                self.panel.show_span(name, span, self._sd(name, begin), until, marks)
+
+    def _sd(self, name: str, begin: float) -> Span | None:
+        """The standard deviation of a quantity of the finger shown, where it has one."""
+        history, column = self._fingers[self._session.finger].history, (name, True)
+        return history.span(_COLUMNS[column], begin, _PARTS) if column in _COLUMNS else None
+
+    def _draw_fingers(
+        self, name: str, since: float, until: float, marks: Sequence[StripMark]
+    ) -> None:
+        """Draw a quantity of all fingers, from `since` s ago, by the clock of this machine.
+
+        For the finger shown that is until the time `until` of its device.
+        """
+        spans, session, column = (
+            dict[str, tuple[Span, float]](),
+            self._session,
+            _COLUMNS[name, False],
+        )
+        ahead = self._fingers[session.finger].ahead
+        for finger in session.fingers.engines if session.fingers else ():
+            frames = self._fingers[finger]
+            zero = until if finger == session.finger else until - ahead + frames.ahead
+            if math.isfinite(zero):
+                spans[finger] = frames.history.span(column, zero + since, _PARTS), zero
+        sd = self._sd(name, until + since)
+        self.panel.show_fingers(name, spans, session.finger, sd, marks)
 
     def _draw_element(self, name: str, begin: float, zero: float, marks: list[StripMark]) -> None:
         history = self._elements[name]

@@ -1,16 +1,32 @@
 """The hand in the window: a map of each finger, and the finger that the window shows."""
 
+import multiprocessing
 import os
 import signal
+import socket
+from contextlib import closing
+from dataclasses import replace
 
+import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
+import kappaskin_app.features.hand as features_hand
+from kappaskin.hand import Finger, HandDescription
 from kappaskin.live import Fingers
 from kappaskin.recording import Recording
 
 SOURCES = {"thumb": "sim:", "index": "sim:fingertip-cap"}
+
+
+HAND = HandDescription(
+    "Two",
+    (
+        Finger("thumb", SOURCES["thumb"], (-0.12, 0.0, 0.0), (0.0, 0.3, 0.0)),
+        Finger("index", SOURCES["index"], (0.04, 0.0, 0.0), (0.0, -0.3, 0.0)),
+    ),
+)
 
 
 @pytest.fixture
@@ -18,7 +34,7 @@ def hand(opened, until):
     fingers = Fingers(SOURCES)
     fingers.connect(SOURCES)
     window = opened("sim:", fingers)
-    window.session.begin_fingers(SOURCES)
+    window.session.begin_fingers(SOURCES, HAND)
     until(lambda: all(" N" in text for text in words(window)))
     return window
 
@@ -28,7 +44,8 @@ def hand_of(window):
 
 
 def words(window):
-    return [view.map.words.text() for view in hand_of(window).values()]
+    views = hand_of(window).values()
+    return [f"{view.map.words.text()}: {view.force.text()}" for view in views]
 
 
 def choose(window, finger):
@@ -126,3 +143,91 @@ def test_noise_of_all_fingers_is_simulated_by_each(opened, until):
             for engine in fingers.engines.values()
         )
     )
+
+
+def test_the_hand_is_drawn_and_a_click_on_a_finger_shows_it(hand, until):
+    view = hand.features["hand"].panel.hand_view
+    until(lambda: set(view.fingers) == set(SOURCES))
+    index = view.fingers["index"]
+    middle = (index.where @ [*index.skin.at_rest(np.array([[0.0105, 0.0105]]))[0][0], 1.0])[:3]
+    at = view.place_of(middle)
+    assert view.finger_at(at) == "index"
+    QTest.mouseClick(view, Qt.MouseButton.LeftButton, pos=at.toPoint())
+    assert hand.session.finger == "index"
+
+
+def test_what_is_held_is_told_with_the_sum_of_forces(hand, until):
+    texts = hand.features["hand"].panel.texts
+    until(lambda: texts["Sum of forces"].text().endswith(" N"))
+    assert texts["Held"].text().startswith("Held: ")
+    assert texts["Sum of moments"].text().endswith(" N mm")
+
+
+def test_without_a_description_the_window_says_what_to_open(hand, until):
+    panel = hand.features["hand"].panel
+    hand.session.hand = None
+    until(lambda: "kappaskin app hand.toml" in panel.texts["Held"].text())
+    assert not panel.hand_view.isVisible()
+    assert not panel.texts["Sum of forces"].isVisible()
+
+
+def test_the_strip_chart_has_a_curve_of_each_finger_that_goes_on_when_another_is_shown(hand, until):
+    hand.actions_by_name["dock-strip_chart"].trigger()
+    panel = hand.features["strip_chart"].strips.panel
+
+    def curves():
+        return {each.name: each.x for each in panel.charts["force"].series if each.name}
+
+    until(lambda: set(curves()) == set(SOURCES))
+    until(lambda: all(len(x) > 20 for x in curves().values()))
+    ends = [x[-1] for x in curves().values()]
+    assert max(ends) - min(ends) < 5.0  # where the processor is busy, a finger is late
+
+    kept = {name: len(x) for name, x in curves().items()}
+    choose(hand, "index")
+    until(lambda: hand.session.estimate is not None)
+    until(lambda: all(len(x) >= kept[name] for name, x in curves().items()))
+
+    panel.all_fingers.click()
+    assert curves() == {}
+
+
+def test_a_recording_starts_in_the_background_and_may_be_ended_before(hand, until, tmp_path):
+    session, path = hand.session, tmp_path / "hand.mcap"
+    session.record(path)
+    assert not session.fingers.recording.active  # its process is not waited for
+    session.record(None)
+    until(path.exists)
+    until(lambda: session.fingers.recording.path == str(path))
+    until(lambda: not session.fingers.recording.active)
+
+
+def test_a_hand_cannot_be_recorded_to_a_file_that_exists(hand, until, tmp_path):
+    path = tmp_path / "hand.mcap"
+    path.touch()
+    hand.session.record(path)
+    until(lambda: "hand.mcap" in hand.statusBar().currentMessage())
+    assert not hand.session.status.recording.active
+
+
+def test_the_scenes_of_all_fingers_are_computed_before_one_is_chosen(hand, until):
+    until(lambda: not any("_answers" in each.name for each in multiprocessing.active_children()))
+    choose(hand, "index")
+    assert not hand.session.making
+    assert hand.session.scene.name == "fingertip-cap"
+
+
+def test_angles_that_no_longer_come_are_told(hand, until, monkeypatch):
+    with closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as robot:
+        robot.bind(("127.0.0.1", 0))
+        address = robot.getsockname()
+        robot.close()
+        panel = hand.features["hand"].panel
+        hand.session.hand = replace(HAND, angles_from="udp://{}:{}".format(*address))
+        until(lambda: panel._joints is not None)  # noqa: SLF001
+        until(panel.hand_view.isVisible)
+        monkeypatch.setattr(features_hand, "_OLD_ANGLES", 0.3)
+    with closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as robot:
+        robot.sendto(b"{}", address)
+    until(lambda: "last joint angles came to udp://" in panel.texts["Held"].text())
+    assert not panel.hand_view.isVisible()

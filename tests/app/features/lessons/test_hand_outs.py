@@ -97,8 +97,8 @@ def test_a_picture_has_the_skin_its_load_and_dead_elements(qapp: QApplication, c
 
 def test_a_lesson_is_called_by_its_number_or_file() -> None:
     assert lesson_called("3").title == lesson_called(str(READY[2])).title == "Why sines"
-    for wrong in ("0", "13"):
-        with pytest.raises(Refusal, match=f"from 1 to 12, or a lesson file, got {wrong}"):
+    for wrong in ("0", "15"):
+        with pytest.raises(Refusal, match=f"from 1 to 14, or a lesson file, got {wrong}"):
             lesson_called(wrong)
 
 

@@ -70,9 +70,11 @@ def test_there_are_lessons_of_everything_asked_for() -> None:
         "region",
         "mend",
         "domes",
+        "two fingers",
+        "roll, slide, grasp",
     ]:
         assert word in titles
-    assert len(READY) >= 12
+    assert len(READY) >= 14
 
 
 @pytest.mark.parametrize("file", READY, ids=lambda file: file.stem)
@@ -265,6 +267,15 @@ def test_a_step_without_settings_begins_with_those_of_one_before() -> None:
     read = lesson_of(HEAD + "## A\nT\n```toml\nset = { force = 0.1 }\n```\n## B\nT\n## C\nT\n", "x")
     assert [step.sets for step in read.steps] == [{"force": 0.1}, None, None]
     assert read.begins(2) == {"force": 0.1}
+
+
+def test_a_lesson_on_a_hand_changes_no_setting() -> None:
+    head = HEAD.replace('learn = "B"', 'learn = "B"\nhand = "hold"')
+    assert lesson_of(head + "## A\nT\n", "x").hand == "hold"
+    with pytest.raises(Refusal, match="on a hand without set, scene and button"):
+        lesson_of(head + "## A\nT\n```toml\nset = { force = 0.1 }\n```\n", "x")
+    with pytest.raises(Refusal, match="line 6: expected hand to be one of explore, hold"):
+        lesson_of(head.replace('"hold"', '"fist"') + "## A\nT\n", "x")
 
 
 def test_the_guide_tells_of_all_there_is_and_its_example_is_a_lesson() -> None:

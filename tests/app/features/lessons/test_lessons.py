@@ -5,10 +5,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import QEvent, Qt
+from PySide6.QtCore import QEvent, QProcess, Qt
 from PySide6.QtGui import QImage, QKeyEvent
 from PySide6.QtWidgets import QApplication, QDockWidget, QFileDialog, QRadioButton
 
+from kappaskin.hand import named_hand
+from kappaskin.live import Fingers
 from kappaskin_app.features.lessons.lesson import (
     UNITS,
     ChoiceAnswer,
@@ -16,7 +18,7 @@ from kappaskin_app.features.lessons.lesson import (
     NumberAnswer,
     Question,
 )
-from kappaskin_app.features.lessons.lesson_file import DOCKS, READOUTS, SETTABLE
+from kappaskin_app.features.lessons.lesson_file import DOCKS, READOUTS, READY, SETTABLE
 from kappaskin_app.features.lessons.progress import DONE
 from kappaskin_app.shell.window import MainWindow
 
@@ -82,13 +84,48 @@ def play(window: MainWindow, name: str, until) -> None:
 def test_every_lesson_can_be_played_through(window: MainWindow, until) -> None:
     before = window.history.settings
     window.teaching.look()
-    assert len(window.teaching.taken) >= 12
-    for name in list(window.teaching.taken):
+    assert len(window.teaching.taken) >= 14
+    for name in [name for name, each in window.teaching.taken.items() if not each.lesson.hand]:
         play(window, name, until)
         window.teaching.leave()
         assert window.history.settings == before, name
-    below = [window.findChild(QDockWidget, name) for name in DOCKS[1:]]
+    below = [window.findChild(QDockWidget, name) for name in DOCKS[1:-1]]
     assert all(dock.isHidden() for dock in below)
+
+
+def test_a_lesson_on_a_hand_opens_in_a_window_of_it(
+    window: MainWindow, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    started = list[list[str]]()
+    monkeypatch.setattr(QProcess, "startDetached", lambda _, given: started.append(given))
+    window.teaching.look()
+    take(window, "13-two-fingers")
+    assert window.teaching.progress is None
+    ((*_, file, option, source),) = started
+    assert (Path(file).name, option, source) == ("13-two-fingers.md", "--source", "hand:hold")
+
+
+@pytest.mark.full
+@pytest.mark.parametrize(
+    ("name", "ready"),
+    [("13-two-fingers", "hold"), ("14-roll-slide-grasp", "roll-between-fingers")],
+)
+def test_a_lesson_on_a_hand_is_played_on_it(opened, until, name: str, ready: str) -> None:
+    hand = named_hand(f"hand:{ready}")
+    sources = {finger.name: finger.source for finger in hand.fingers}
+    fingers = Fingers(sources)
+    fingers.connect(sources)
+    window = opened(sources["thumb"], fingers)
+    window.session.begin_fingers(sources, hand)
+    before, radius = window.history.settings, {"hold": 41.2, "roll-between-fingers": 12}[ready]
+    held = window.features["hand"].panel
+    until(lambda: held.held is not None and held.held.kind)
+    assert 1e3 * held.held.fits[held.held.kind].radius == pytest.approx(radius, abs=0.4)
+    window.opening.open(next(file for file in READY if name in file.name))
+    play(window, name, until)
+    window.teaching.leave()
+    assert window.history.settings == before
+    assert window.session.source == sources["thumb"]
 
 
 @pytest.mark.full
@@ -307,7 +344,7 @@ def test_the_figure_holds_the_name_and_the_window(
 def test_whatever_a_lesson_may_point_at_is_in_the_window_and_own_ones_are_taken(
     window: MainWindow, tmp_path: Path
 ) -> None:
-    for place in (*DOCKS, *READOUTS, *SETTABLE):
+    for place in (*DOCKS[:-1], *READOUTS, *SETTABLE):
         assert window.pointing.targets(place)
     file = tmp_path / "own.md"
     head = '+++\nformat = 1\ntitle = "Mine"\nminutes = 3\nlearn = "It."\n+++\n'

@@ -1,14 +1,17 @@
 """Presenter controller: full screen, the simulated hand, and lost connections."""
 
 import math
+from dataclasses import replace
 from importlib.resources import files
+from types import SimpleNamespace
 
 import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QDockWidget
 
+from kappaskin.publish import CueStatus, PublishStatus, TargetStatus
 from kappaskin_app.features.presenter.feedback import RadiusEstimate
-from kappaskin_app.shell.badge import GAP, LOST, SIM
+from kappaskin_app.shell.badge import GAP, LATE, LOST, SIM
 from kappaskin_app.theme import THEMES, current
 
 LEFT = Qt.MouseButton.LeftButton
@@ -209,6 +212,29 @@ def test_a_lost_line_says_what_to_do_and_what_is_felt_comes_back(demo, until) ->
     demo.session.connect_to("sim:demo")
     until(lambda: view.strip.state == SIM and view.pages.currentWidget() is not view.banner)
     until(lambda: demo.presenter.feedback is not None)
+
+
+def test_a_faded_cue_of_any_finger_is_told_at_once_and_for_a_second(
+    demo, until, monkeypatch
+) -> None:
+    view, session = demo.presenter.view, demo.session
+
+    def told(cue: CueStatus) -> str:
+        """The state that is shown with a cue of the index, in a hand."""
+        publishing = PublishStatus((TargetStatus("cue://glove:1", cue=cue),))
+        index = replace(session.status, publishing=publishing)
+        hand = SimpleNamespace(status=lambda: {"thumb": session.status, "index": index})
+        with monkeypatch.context() as patch:
+            patch.setattr(session, "fingers", hand)
+            demo.presenter.follow(session.status)
+        return view.banner.state if view.pages.currentWidget() is view.banner else ""
+
+    until(lambda: told(CueStatus("live", 1.0, 1e-3, 2.4e-3)) == "")
+    until(lambda: told(CueStatus("late", 0.3, 1e-3, 2.4e-3)) == LATE)
+    assert view.banner.since == "index"
+    assert view.strip.latency == "haptic cue 1.0 ms after the data, 99 % within 2.4 ms"
+    assert told(CueStatus("live", 0.4)) == LATE  # it returns
+    until(lambda: told(CueStatus("live", 1.0)) == "")
 
 
 @pytest.mark.full

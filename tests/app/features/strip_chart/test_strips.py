@@ -150,6 +150,21 @@ def test_a_drag_over_a_part_zooms_into_all_charts_and_a_double_click_shows_all(
     assert not sought
 
 
+def test_each_finger_has_a_curve_with_its_name_on_one_clock(panel) -> None:
+    times = np.linspace(-60, 0, 300)
+    sd = Span(times, np.full((3, 300), 0.1))
+    # The second finger's device was switched on 100 s earlier.
+    spans = {
+        "thumb": (Span(times, np.ones((3, 300))), 0.0),
+        "index": (Span(times + 100, np.full((3, 300), 2.0)), 100.0),
+    }
+    panel.show_fingers("force", spans, "index", sd, ())
+    thumb, index, band = panel.charts["force"].series
+    assert [(each.name, each.colour) for each in (thumb, index)] == [("thumb", 0), ("index", 1)]
+    np.testing.assert_allclose(thumb.x, index.x, atol=1e-9)
+    assert (thumb.y[0], index.y[0], band.colour) == (1.0, 2.0, 1)
+
+
 def test_marks_are_lines_whose_texts_are_shown_at_their_foot(panel, until) -> None:
     times = np.linspace(-60, 0, 300)
     marks = [StripMark(-30.0, "note", "lifted"), StripMark(-20.0, "event", "5 messages lost")]
