@@ -28,6 +28,7 @@ from kappaskin import (
 )
 from kappaskin.calibration import Tare, TareStore
 from kappaskin.calibration.calibration import digest, fingerprint
+from kappaskin.hand import HandTarget, TargetMessage, operation
 from kappaskin.live.codec import decoded, encoded
 from kappaskin.live.link import Answer, Change, Message, Seen
 from kappaskin.live.requests import Note, Requested, Seek
@@ -162,6 +163,12 @@ def _content(data: bytes, _: Path) -> None:
 def _information(data: bytes, _: Path) -> None:
     sensor = information.sensor_from_json(data.decode(errors="replace"))
     information.sensor_from_json(information.sensor_to_json(sensor))
+
+
+def _hand_target(data: bytes, _: Path) -> None:
+    message = operation.decoded(data)
+    if operation.decoded(message.encoded()) != message:
+        raise RuntimeError("it came back as another")
 
 
 _SCAN = encode_samples(7, 0.1, np.arange(300), np.arange(300, dtype=np.int32), 2)
@@ -440,6 +447,12 @@ TARGETS = (
         _content,
         tuple(piece[22:-4] for piece in _PIECES),
         (bytes([2, 1, 0, 0, 255, 255]), bytes([4, 255]), b"\xff\xff"),
+    ),
+    Target(
+        "hand target",
+        _hand_target,
+        (TargetMessage(HandTarget((0.01, -0.02, 0.03), grip=1.0), True, 7, 3).encoded(),),
+        (*_JSON, b"NaN", b"-0.0"),
     ),
     Target("information", _information, (_PIECES[0][22:-4],), _JSON),
     Target(

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, cast
 
 from kappaskin.errors import Refusal
-from kappaskin.hand.pose import Triple
+from kappaskin.hand.pose import Placement, Triple, placement
 
 STALE = 0.1
 """Seconds after which a target is not followed any more, unless another one came."""
@@ -37,6 +37,11 @@ class HandTarget:
     rotation: Triple = (0.0, 0.0, 0.0)
     grip: float = 0.0
     time: float = 0.0
+
+    @property
+    def where(self) -> Placement:
+        """The placement of the hand in its home."""
+        return placement(self.position, self.rotation)
 
     def moved(self, shift: Triple, turn: Triple, grip: float) -> "HandTarget":
         """The target `shift` in m further on, turned by `turn` in rad, gripped by `grip` N more.

@@ -44,9 +44,9 @@ def rotation(target: HandTarget) -> Rotation:
 def test_no_target_ever_exceeds_the_limits(within: OperatorLimits, asked) -> None:
     follower, now = TargetFilter(within, HandTarget()), 0.0
     for wanted, later in asked:
-        was, now = follower.target, now + later
+        was, before, now = follower.target, now, now + later
         target = follower.follow(wanted, now)
-        seconds = max(later, 0.0)
+        seconds = max(now - before, 0.0)  # as the clock has it, whose digits are limited
         assert math.dist(was.position, target.position) <= within.speed * seconds * (1 + 1e-9)
         turn = (rotation(target) * rotation(was).inv()).magnitude()
         assert turn <= within.turn_rate * seconds + 1e-7

@@ -22,7 +22,7 @@ class OperatorFeature:
         self.driving = driving = HandDriving(shell.session, shell.tasks)
         self.control = control = OperatorControl(shell.history, panel.pad, driving.begin)
         self.feeling, self.tones = Feeling(shell.session), Sound(control)
-        shell.docks.put_below("operator", "Operator", panel, "Ctrl+Alt+O", _ABOUT, height=0.36)
+        shell.docks.put_below("operator", "Operator", panel, "Ctrl+Alt+R", _ABOUT, height=0.36)
         shell.panels.join(panel.form)
         shell.settings_shown.connect(guarded(panel.show_settings))
         control.followers.append(driving.follow)

@@ -4,12 +4,10 @@ from typing import NamedTuple
 
 from PySide6.QtCore import QObject, Signal
 
-from kappaskin.hand import HandTarget, Placement, SimulatedHand, placement
+from kappaskin.hand import HandTarget, Placement, SimulatedHand
 from kappaskin.scenes import Scene
 from kappaskin_app.shell.background import BackgroundTask, Newest, Tasks
 from kappaskin_app.shell.session import Session
-
-IDENTITY = placement((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
 class Home(NamedTuple):
@@ -22,7 +20,7 @@ class Home(NamedTuple):
 def home_of(hand: SimulatedHand) -> Home:
     """Where the course of `hand` begins; at its middle, without a grip, if it has none."""
     if hand.course is None:
-        return Home(IDENTITY, 0.0)
+        return Home(HandTarget().where, 0.0)
     where, grip, _ = hand.course.at(0.0)
     return Home(where, grip)
 
@@ -32,7 +30,7 @@ def pose_of(target: HandTarget, home: Home, held: bool) -> Placement:
 
     One that stands on something stays where it is, and the hand is moved over it.
     """
-    moved = placement(target.position, target.rotation)
+    moved = target.where
     if held:
         turned = moved.rotation @ home.where.rotation
         return Placement(turned, home.where.position + moved.position)
@@ -59,7 +57,7 @@ class HandDriving(QObject):
     def __init__(self, session: Session, tasks: Tasks) -> None:
         super().__init__()
         self._session, self._target = session, HandTarget()
-        self._rate, self._home = Newest(self), Home(IDENTITY, 0.0)
+        self._rate, self._home = Newest(self), Home(HandTarget().where, 0.0)
         # A move takes milliseconds, but the first one of a hand a second.
         self._task = BackgroundTask(tasks, "", self._play, self._refuse, self._go_on)
         self._waits = False

@@ -51,7 +51,7 @@ _ENABLE = "Let the input move the hand. It holds still, with its grip, while thi
 _RATES = 25  # reports over which rates are taken: about a second
 _WIDE = 230  # px of the column of the target
 _WIDEST = 360  # px of the pad
-_PERCENT = 100
+_PERCENT, _MINUS = 100, "\N{MINUS SIGN}"
 
 
 class OperatorForm(Form):
@@ -201,8 +201,8 @@ class OperatorPanel(QWidget):
         roll, pitch, yaw = (math.degrees(at) + 0.0 for at in target.rotation)
         late = status.latency
         return {
-            "Position": f"{x:.1f}, {y:.1f}, {z:.1f} mm",
-            "Rotation": f"{roll:.1f}, {pitch:.1f}, {yaw:.1f}\N{DEGREE SIGN}",
+            "Position": f"{x:.1f}, {y:.1f}, {z:.1f} mm".replace("-", _MINUS),
+            "Rotation": f"{roll:.1f}, {pitch:.1f}, {yaw:.1f}\N{DEGREE SIGN}".replace("-", _MINUS),
             "Grip": f"{target.grip:.2f} N",
             "UDP": f"{rate_in}/s; {status.received:,} followed, {status.late:,} late, "
             f"{status.refused:,} refused",
