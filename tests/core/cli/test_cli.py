@@ -292,7 +292,7 @@ def test_every_subcommand_shows_an_example_in_its_help(run) -> None:
 @pytest.mark.parametrize(
     ("panel", "commands"),
     [
-        ("Live", {"app", "demo", "replay", "handout", "publish", "listen"}),
+        ("Live", {"app", "demo", "replay", "handout", "publish", "serve", "listen"}),
         ("Recordings", {"record", "info", "verify", "repair", "export", "import", "reconstruct"}),
         ("Sensor", {"calibrate", "tare", "press", "monitor", "device"}),
         ("Studies", {"plan", "simulate", "cost", "compare", "stability", "regions", "study",
