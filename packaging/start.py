@@ -60,6 +60,8 @@ READING = (
 # One that crashes ends the run: what it had in hand would be waited for without end.
 # Three of them: fewer leave the cores idle, more gain nothing.
 TESTS = ("pytest", "-n3", "--max-worker-restart=0", "-m", "not full")
+# A busy machine can make a test of a window late; more that fail are no matter of time.
+RETRIED = 3
 LIBRARY = "tests/core"
 ALL_CASES = ("-m", "")  # the last -m counts
 # Benchmarks and drills are named so that plain pytest passes them by.
@@ -132,7 +134,7 @@ def test(arguments: list[str], shown: dict[str, str]) -> int:
     command = [tool("python"), __file__, "lint"]
     with tempfile.TemporaryFile("w+") as said, started(command, shown, said) as reading:
         say(shlex.join([*TESTS, *arguments]))
-        tested = run([tool(TESTS[0]), *TESTS[1:], *arguments], shown, cwd=ROOT)
+        tested = run_tests(arguments, shown)
         read = reading.wait()
         said.seek(0)
         print(said.read(), end="", flush=True)
@@ -141,6 +143,23 @@ def test(arguments: list[str], shown: dict[str, str]) -> int:
     elif not read:
         say(f"All {len(READING) + 1} checks passed")
     return read or tested
+
+
+def run_tests(arguments: list[str], shown: dict[str, str]) -> int:
+    """Run the tests, and once more, one at a time, the few that fail beside others."""
+    with tempfile.TemporaryDirectory() as folder:
+        remembered = ["-p", "cacheprovider", "-o", f"cache_dir={folder}"]
+        command = [tool(TESTS[0]), *TESTS[1:], *arguments, *remembered]
+        tested = run(command, shown, cwd=ROOT)
+        failed = Path(folder, "v", "cache", "lastfailed")
+        names = list(json.loads(failed.read_text())) if failed.exists() else []
+        if tested != 1 or len(names) > RETRIED:
+            return tested
+        say(f"Once more, one at a time: {shlex.join(names)}")
+        tested = run([*command, "-n1", "--last-failed"], shown, cwd=ROOT)
+    if not tested:
+        say(f"To mend: failed beside other tests, passed alone: {shlex.join(names)}")
+    return tested
 
 
 def lint(arguments: list[str], shown: dict[str, str]) -> int:

@@ -132,6 +132,33 @@ def test_full_runs_every_step_and_fails_where_one_does(monkeypatch, capfd):
     assert re.search(r"==> Failed: python \S*start\.py nothing \(exit code 2\)\n$", printed)
 
 
+@pytest.mark.parametrize(
+    ("now", "code", "rounds", "said"),
+    [("late = not seen", 0, 2, "To mend"), ("late = True", 1, 2, ""), ("late = False", 0, 1, "")],
+)
+def test_what_fails_beside_others_is_told_and_tried_alone(
+    tmp_path, monkeypatch, capfd, now, code, rounds, said
+):
+    start = runpy.run_path(str(ROOT / "packaging" / "start.py"))
+    file = tmp_path / "test_window.py"
+    file.write_text(
+        "from pathlib import Path\n"
+        "def test_in_time():\n"
+        "    file = Path(__file__).with_name('rounds')\n"
+        "    seen = file.read_text() if file.exists() else ''\n"
+        "    file.write_text(seen + '.')\n"
+        f"    {now}\n"
+        "    assert not late\n"
+    )
+    monkeypatch.setitem(start["run_tests"].__globals__, "TESTS", ("pytest", "-n0"))
+
+    arguments = ["-c", "/dev/null", f"--rootdir={tmp_path}", str(file)]
+    assert start["run_tests"](arguments, start["environment"]()) == code
+
+    assert (tmp_path / "rounds").read_text() == "." * rounds
+    assert said in capfd.readouterr().out.splitlines()[-1]
+
+
 def test_another_python_has_a_venv_of_its_own(monkeypatch):
     start = runpy.run_path(str(ROOT / "packaging" / "start.py"))
     made, ran = [], []

@@ -51,14 +51,22 @@ def layout_of(window):
     )
 
 
+def settled(window, qtbot):
+    """The layout, once the window has had it for a second."""
+    was, now = None, layout_of(window)
+    while was != now:
+        qtbot.wait(1000)
+        was, now = now, layout_of(window)
+    return now
+
+
 @pytest.mark.full
 def test_leaving_gives_the_window_back_as_it_was(window, until, qtbot) -> None:
     window.actions_by_name["dock-cost"].trigger()
     window.actions_by_name["dock-scene"].trigger()
     window.actions_by_name["dock-curvature"].trigger()
     until(lambda: window.docks["scene"].width() < window.width())  # between the columns
-    qtbot.wait(300)
-    was = layout_of(window)
+    was = settled(window, qtbot)
 
     qtbot.keyClick(window, Qt.Key.Key_F11)
     until(lambda: window.presenter.on)
@@ -74,11 +82,9 @@ def test_leaving_gives_the_window_back_as_it_was(window, until, qtbot) -> None:
 
 def test_a_layout_chosen_while_presenting_is_that_of_the_window(window, until, qtbot) -> None:
     window.actions_by_name["layout-study"].trigger()
-    qtbot.wait(300)
-    wanted = layout_of(window)
+    wanted = settled(window, qtbot)
     window.actions_by_name["layout-teach"].trigger()
-    qtbot.wait(300)
-    assert layout_of(window) != wanted
+    assert settled(window, qtbot) != wanted
     qtbot.keyClick(window, Qt.Key.Key_F11)
     until(lambda: window.presenter.on)
 
