@@ -1,7 +1,8 @@
-"""The guide's pictures, from the commands that their captions name.
+"""The guide's pictures, from the commands that their captions name, and README's moving one.
 
 Run `python tests/guide_pictures.py` when a figure looks otherwise than it did. A picture of points
-is made smaller, of a few colours; one of lines stays as the command wrote it.
+is made smaller, of a few colours; one of lines stays as the command wrote it. `python
+tests/guide_pictures.py film` makes the moving picture, of the window on a display.
 """
 
 import os
@@ -10,6 +11,7 @@ import shlex
 import shutil
 import sys
 import tempfile
+import time
 from pathlib import Path
 
 from PIL import Image
@@ -19,6 +21,9 @@ from kappaskin.cli import main
 GUIDE = Path(__file__).parents[1] / "resources" / "kappaskin_resources" / "guide"
 _WINDOW, _FIGURE = 1280, 780  # px wide, of a window and of a figure that is printed finer
 _LARGEST = 60_000  # bytes of a picture
+MOVING = GUIDE / "pictures" / "window.webp"
+_SETTLED = 12.0  # s until all is drawn
+_FILM, _SLOWED = (960, 600), 0.2
 _SHOWN = re.compile(r"!\[[^\]]+\]\(([^)]+)\)\n\n\*[^*`]*`((?:kappaskin|python3) [^`]+)`\*")
 
 
@@ -56,7 +61,31 @@ def keep(made: Path, picture: Path) -> None:
                 break
 
 
+def film(source: str, seconds: float, rate: float) -> None:
+    """README's moving picture: the window on a source, `rate` pictures a second of it."""
+    from kappaskin_app.launch import opened
+
+    app, window = opened(source, None)
+    window.session.engine.seek(speed=_SLOWED)  # a picture takes longer than its time
+    began, pictures = time.monotonic(), []
+    with tempfile.TemporaryDirectory() as folder:
+        while len(pictures) < seconds * rate:
+            app.processEvents()
+            if time.monotonic() - began < _SETTLED + len(pictures) / rate / _SLOWED:
+                time.sleep(0.001)
+                continue
+            window.picture(made := Path(folder) / "window.png")
+            with Image.open(made) as image:
+                pictures.append(image.convert("RGB").resize(_FILM, Image.Resampling.LANCZOS))
+    window.close()
+    how = {"duration": round(1000 / rate), "quality": 50, "method": 6, "minimize_size": True}
+    pictures[0].save(MOVING, save_all=True, append_images=pictures[1:], loop=0, **how)
+
+
 if __name__ == "__main__":
+    if sys.argv[1:] == ["film"]:
+        film("sim:fingertip-cap", 6.0, 8.0)
+        raise SystemExit
     os.chdir(tempfile.mkdtemp())
     shutil.copytree(GUIDE.parent / "measured", "measured")
     for page in sorted(GUIDE.glob("*.md")):

@@ -18,7 +18,7 @@ def _import(statement: str) -> float:
     return time.perf_counter() - start
 
 
-# Nothing else is loaded by the first; the second are the names of the README's example.
+# Nothing else is loaded by the first; the second are the names of an example of the guide.
 @pytest.mark.parametrize(
     "ours",
     [
