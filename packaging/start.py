@@ -222,7 +222,7 @@ def core(arguments: list[str], shown: dict[str, str]) -> int:
 
 def bundle(arguments: list[str], shown: dict[str, str]) -> int:
     """Make the app a folder that needs no Python, and try it."""
-    install(VENV, f"{ROOT}[bundle]", keep=True)
+    install(VENV, str(ROOT), *group("bundle"), keep=True)
     return run([tool("python"), str(ROOT / "packaging/bundle/build.py"), *arguments], shown)
 
 
@@ -250,7 +250,8 @@ def set_up() -> None:
     wanted, found = stamp(), STAMP.read_text("utf-8") if STAMP.exists() else ""
     if found != wanted:
         STAMP.unlink(missing_ok=True)  # Killed from here on, the next start begins anew.
-        install(VENV, f"{ROOT}[app,dev]", keep=found.split("\n")[0] == wanted.split("\n")[0])
+        keep = found.split("\n")[0] == wanted.split("\n")[0]
+        install(VENV, f"{ROOT}[app]", *group("dev"), keep=keep)
         STAMP.write_text(wanted, "utf-8")
     have_libraries()
 
@@ -259,6 +260,16 @@ def stamp() -> str:
     """Two lines, which interpreter works where, and a hash of what it was asked to install."""
     asked = hashlib.sha256((ROOT / "pyproject.toml").read_bytes() + CONSTRAINTS.read_bytes())
     return f"{platform.python_version()} {sys.base_prefix} {ROOT}\n{asked.hexdigest()}\n"
+
+
+def group(name: str) -> list[str]:
+    """The requirements of a dependency group, which pip before 25.1 does not read."""
+    import tomllib  # An older Python lacks it, and is to be told what is needed.
+
+    lines = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["dependency-groups"][name]
+    included = [each for line in lines if isinstance(line, dict) for each in line.values()]
+    own = [line for line in lines if isinstance(line, str)]
+    return own + [requirement for other in included for requirement in group(other)]
 
 
 def base_python() -> str:

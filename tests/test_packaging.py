@@ -24,8 +24,10 @@ CONSTRAINTS = (ROOT / "packaging" / "constraints.txt").read_text("utf-8")
 def requirements():
     project = PROJECT["project"]
     optional = project["optional-dependencies"].values()
-    asked = [project["dependencies"], PROJECT["build-system"]["requires"], *optional]
-    return [Requirement(text) for texts in asked for text in texts]
+    groups = PROJECT["dependency-groups"].values()
+    asked = [project["dependencies"], PROJECT["build-system"]["requires"], *optional, *groups]
+    named = [Requirement(text) for texts in asked for text in texts if isinstance(text, str)]
+    return [each for each in named if each.name != "kappaskin"]  # an extra by another name
 
 
 def pins():
@@ -106,6 +108,14 @@ def test_start_needs_the_standard_library_alone():
 
     assert "subprocess" in imported
     assert imported <= sys.stdlib_module_names
+
+
+def test_a_dependency_group_is_read_with_those_that_it_includes():
+    group = runpy.run_path(str(ROOT / "packaging" / "start.py"))["group"]
+    groups = PROJECT["dependency-groups"]
+
+    assert group("bundle") == groups["bundle"]
+    assert sorted(group("dev")) == sorted([*groups["dev"][1:], *groups["compare"]])
 
 
 def test_every_task_is_told_in_its_help_and_to_those_who_contribute():
