@@ -219,6 +219,24 @@ def test_start_needs_the_standard_library_alone():
     assert imported <= sys.stdlib_module_names
 
 
+def test_a_python_that_is_too_old_is_told_in_a_line_what_to_do(monkeypatch):
+    start = runpy.run_path(str(ROOT / "packaging" / "start.py"))
+    known = start["set_up"].__globals__
+    ast.parse((ROOT / "packaging" / "start.py").read_text("utf-8"), feature_version=(3, 8))
+    monkeypatch.setitem(known, "OLDEST", (3, 99))
+
+    for names, remedy in (
+        ([], r"install a newer one \(Debian 12, .*\)"),
+        (
+            ["false", Path(sys.executable).name],
+            rf"start with {Path(sys.executable).name} .*py",
+        ),
+    ):
+        monkeypatch.setitem(known, "named_pythons", lambda names=names: names)
+        with pytest.raises(start["Stop"], match=rf"^expected Python 3\.99 or newer, .*; {remedy}$"):
+            start["set_up"]()
+
+
 def test_a_dependency_group_is_read_with_those_that_it_includes():
     group = runpy.run_path(str(ROOT / "packaging" / "start.py"))["group"]
     groups = PROJECT["dependency-groups"]
