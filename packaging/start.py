@@ -17,7 +17,7 @@
                                                    --python python3.12 with another Python
     python3 packaging/start.py bundle [--try]      makes the app one folder; --try only tries it
 
-Standard library only. A second start with nothing changed installs nothing.
+Needs Linux and Python 3.11 or newer. A second start with nothing changed installs nothing.
 """
 
 from __future__ import annotations
@@ -222,7 +222,7 @@ def core(arguments: list[str], shown: dict[str, str]) -> int:
 
 def bundle(arguments: list[str], shown: dict[str, str]) -> int:
     """Make the app a folder that needs no Python, and try it."""
-    install(VENV, f"{ROOT}[bundle]", keep=True)
+    install(VENV, str(ROOT), *group("bundle"), keep=True)
     return run([tool("python"), str(ROOT / "packaging/bundle/build.py"), *arguments], shown)
 
 
@@ -243,14 +243,18 @@ TASKS = {
 def set_up() -> None:
     """Make .venv and have the system libraries, or stop with what to do."""
     if sys.version_info[:2] < OLDEST:
-        raise Stop(
-            "expected Python {}.{} or newer, this is {}; start with a newer one, e.g. python3.12 "
-            "packaging/start.py".format(*OLDEST, platform.python_version())
-        )
+        newer = [name for name in named_pythons() if starts(name)]
+        remedy = "install a newer one (Debian 12, Ubuntu 24.04: apt-get install python3-venv)"
+        remedy = f"start with {newer[-1]} packaging/start.py" if newer else remedy
+        wanted = "Python {}.{} or newer".format(*OLDEST)
+        raise Stop(f"expected {wanted}, this is {platform.python_version()}; {remedy}")
+    if not sys.platform.startswith("linux"):
+        say(f"Kappaskin is tested on Linux alone; parts may fail on this {platform.system()}")
     wanted, found = stamp(), STAMP.read_text("utf-8") if STAMP.exists() else ""
     if found != wanted:
         STAMP.unlink(missing_ok=True)  # Killed from here on, the next start begins anew.
-        install(VENV, f"{ROOT}[app,dev]", keep=found.split("\n")[0] == wanted.split("\n")[0])
+        keep = found.split("\n")[0] == wanted.split("\n")[0]
+        install(VENV, f"{ROOT}[app]", *group("dev"), keep=keep)
         STAMP.write_text(wanted, "utf-8")
     have_libraries()
 
@@ -261,6 +265,16 @@ def stamp() -> str:
     return f"{platform.python_version()} {sys.base_prefix} {ROOT}\n{asked.hexdigest()}\n"
 
 
+def group(name: str) -> list[str]:
+    """The requirements of a dependency group, which pip before 25.1 does not read."""
+    import tomllib  # An older Python lacks it, and is to be told what is needed.
+
+    lines = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["dependency-groups"][name]
+    included = [each for line in lines if isinstance(line, dict) for each in line.values()]
+    own = [line for line in lines if isinstance(line, str)]
+    return own + [requirement for other in included for requirement in group(other)]
+
+
 def base_python() -> str:
     """The Python that venvs are made with: .venv's own would clear itself away."""
     return getattr(sys, "_base_executable", sys.executable)
@@ -268,14 +282,21 @@ def base_python() -> str:
 
 def other_pythons() -> list[str]:
     """The names of other Pythons on the path that the library is for, and that start."""
-    minors = set(range(OLDEST[1], 30)) - {sys.version_info.minor}
-    names = [name for minor in sorted(minors) if shutil.which(name := f"python3.{minor}")]
-    started = [
-        name for name in names if not subprocess.call([name, "-c", ""], stderr=subprocess.DEVNULL)
-    ]
+    names = named_pythons()
+    started = [name for name in names if starts(name)]
     if missing := [name for name in names if name not in started]:
         say(f"Skipped, as they do not start here: {', '.join(missing)}")
     return started
+
+
+def named_pythons() -> list[str]:
+    """The names of other Pythons on the path that the library is for."""
+    minors = set(range(OLDEST[1], 30)) - {sys.version_info.minor}
+    return [name for minor in sorted(minors) if shutil.which(name := f"python3.{minor}")]
+
+
+def starts(python: str) -> bool:
+    return not subprocess.call([python, "-c", ""], stderr=subprocess.DEVNULL)
 
 
 def install(venv: Path, *asked: str, keep: bool, python: str = "") -> None:

@@ -8,10 +8,12 @@ import runpy
 import shutil
 import subprocess
 import sys
+from importlib import metadata
 from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from PIL import Image
 
 from kappaskin_resources import __file__ as resources
 
@@ -118,6 +120,37 @@ def test_the_icon_is_drawn_from_what_the_window_shows(tmp_path):
     assert icon.size().toTuple() == (256, 256)
     assert icon.pixelColor(0, 0).alpha() == 0  # its corners are round
     assert icon.pixelColor(128, 80).name() == "#ffb347"  # the ball
+
+
+@pytest.mark.parametrize(
+    ("version", "drawn", "wrong"),
+    [
+        (metadata.version("kappaskin"), True, []),
+        ("9.9", True, ["--version: expected"]),
+        (metadata.version("kappaskin"), False, ["no skin is drawn"]),
+    ],
+)
+def test_another_version_or_a_window_without_a_skin_fails_the_trial(
+    version, drawn, wrong, tmp_path
+):
+    down = Image.linear_gradient("L")
+    shaded = Image.merge("RGB", (down, down.rotate(90), down))
+    (shaded if drawn else down).save(tmp_path / "window.png")
+    bundle, room = tmp_path / "dist" / "kappaskin", tmp_path / "room"
+    bundle.mkdir(parents=True)
+    room.mkdir()
+    # Tells its version, or leaves the picture where the last argument says.
+    script = f"#!/bin/sh\n[ $# = 1 ] && echo {version} || for to; do :; done\n"
+    script += f'[ $# = 1 ] || cp "{tmp_path}/window.png" "$to"\n'
+    (bundle / "kappaskin").write_text(script)
+    (bundle / "kappaskin").chmod(0o755)
+
+    trial = runpy.run_path(str(RECIPE / "trying.py"))["Trial"](bundle, room)
+    trial.tell_version()
+    trial.open("window")
+
+    assert len(trial.failures) == len(wrong)
+    assert all(told.startswith(start) for told, start in zip(trial.failures, wrong, strict=True))
 
 
 def test_what_is_left_out_is_imported_by_no_line_of_ours():

@@ -4,6 +4,7 @@ import ast
 import pkgutil
 import subprocess
 import sys
+from importlib import metadata
 from pathlib import Path
 
 import pytest
@@ -106,3 +107,8 @@ def test_every_exported_name_is_there_and_is_no_module(face):
 def test_a_misspelt_name_is_refused_as_of_any_module():
     with pytest.raises(ImportError, match="cannot import name 'LeastSquare'"):
         from kappaskin import LeastSquare  # noqa: F401
+
+
+def test_the_version_is_that_of_the_package_and_costs_nothing_until_it_is_asked_for():
+    assert kappaskin.__version__ == metadata.version("kappaskin")
+    assert "importlib.metadata" not in loaded_by("import kappaskin")

@@ -1,9 +1,12 @@
 import ast
+import email
+import json
 import re
 import runpy
 import shutil
 import subprocess
 import sys
+import tarfile
 import tomllib
 import zipfile
 from importlib import metadata
@@ -11,6 +14,7 @@ from pathlib import Path
 
 import psutil
 import pytest
+import yaml
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
@@ -18,14 +22,17 @@ from kappaskin.cli import system as doctor
 
 ROOT = Path(__file__).parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
+VERSION = PROJECT["project"]["version"]
 CONSTRAINTS = (ROOT / "packaging" / "constraints.txt").read_text("utf-8")
 
 
 def requirements():
     project = PROJECT["project"]
     optional = project["optional-dependencies"].values()
-    asked = [project["dependencies"], PROJECT["build-system"]["requires"], *optional]
-    return [Requirement(text) for texts in asked for text in texts]
+    groups = PROJECT["dependency-groups"].values()
+    asked = [project["dependencies"], PROJECT["build-system"]["requires"], *optional, *groups]
+    named = [Requirement(text) for texts in asked for text in texts if isinstance(text, str)]
+    return [each for each in named if each.name != "kappaskin"]  # an extra by another name
 
 
 def pins():
@@ -56,15 +63,25 @@ def references_gained(value, calls, change):
     return sys.getrefcount(value) - before
 
 
-def test_the_wheel_holds_the_three_packages_and_nothing_else(tmp_path):
-    command = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(tmp_path)]
+@pytest.fixture(scope="module")
+def built(tmp_path_factory):
+    """A folder with a wheel and a source distribution."""
+    folder = tmp_path_factory.mktemp("built")
+    command = [sys.executable, "-m", "hatchling", "build", "-d", str(folder)]
     subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
+    return folder
 
-    (wheel,) = tmp_path.iterdir()
-    with zipfile.ZipFile(wheel) as archive:
+
+def wheel(built):
+    (file,) = built.glob("*.whl")
+    return zipfile.ZipFile(file)
+
+
+def test_the_wheel_holds_the_three_packages_and_nothing_else(built):
+    with wheel(built) as archive:
         names = set(archive.namelist())
 
-    information = f"kappaskin-{PROJECT['project']['version']}.dist-info/"
+    information = f"kappaskin-{VERSION}.dist-info/"
     ours = {
         file.relative_to(ROOT / root).as_posix()
         for root in ("core", "app", "resources")
@@ -81,6 +98,100 @@ def test_the_wheel_holds_the_three_packages_and_nothing_else(tmp_path):
         for name in ("METADATA", "RECORD", "WHEEL", "entry_points.txt", "licenses/LICENSE")
     }
     assert ours <= names
+
+
+def test_the_metadata_say_what_it_is_and_for_whom(built):
+    project = PROJECT["project"]
+    with wheel(built) as archive:
+        text = archive.read(f"kappaskin-{VERSION}.dist-info/METADATA").decode()
+    told = email.message_from_string(text)
+
+    assert (told["Name"], told["Version"], told["Author"]) == (
+        "kappaskin",
+        VERSION,
+        "The Kappaskin project",
+    )
+    assert (told["License-Expression"], told["Requires-Python"]) == ("BSD-3-Clause", ">=3.11")
+    assert set(told["Keywords"].split(",")) == set(project["keywords"])
+    assert told.get_all("Classifier") == project["classifiers"]
+    assert set(told.get_all("Provides-Extra")) == set(project["optional-dependencies"])
+    assert "distributed>=2025.1; extra == 'dask'" in told.get_all("Requires-Dist")
+    assert not {"Home-page", "Project-URL", "Author-email"} & set(told.keys())
+
+
+def test_the_long_description_is_the_readme_without_links_that_lead_nowhere(built):
+    with wheel(built) as archive:
+        text = archive.read(f"kappaskin-{VERSION}.dist-info/METADATA").decode()
+    shown, readme = text.partition("\n\n")[2], (ROOT / "README.md").read_text("utf-8")
+    code = re.compile(r"```.*?```", re.DOTALL)
+
+    assert re.search(r"\]\((?!https://)", readme)
+    assert not re.findall(r"\]\((?!https://)|^\[.*?\]: |<img|href=", code.sub("", shown), re.M)
+    assert code.findall(shown) == code.findall(readme)
+    assert "**The guide** covers first steps" in shown
+
+
+def test_the_source_distribution_has_what_is_to_be_read(built):
+    (file,) = built.glob("*.tar.gz")
+    with tarfile.open(file) as archive:
+        names = {name.partition("/")[2] for name in archive.getnames()}
+    linked = re.findall(r"\]\(([^):#]+)(?:#[^)]*)?\)", (ROOT / "README.md").read_text("utf-8"))
+
+    assert {"CITATION.cff", "CHANGELOG.md", "LICENSE", "packaging/start.py", *linked} <= names
+
+
+def test_the_citation_names_the_project_and_the_paper():
+    told = yaml.safe_load((ROOT / "CITATION.cff").read_text("utf-8"))
+    (paper,) = told["references"]
+
+    assert {"cff-version", "message", "title", "authors"} <= set(told)
+    assert told["authors"] == PROJECT["project"]["authors"]
+    assert (told["license"], told["abstract"]) == (
+        PROJECT["project"]["license"],
+        PROJECT["project"]["description"],
+    )
+    assert {"authors", "title", "type"} <= set(paper)
+    assert f"*{paper['title']}* ({paper['year']})" in (ROOT / "README.md").read_text("utf-8")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["*.whl", pytest.param("*.tar.gz", marks=pytest.mark.full)])
+def test_installed_anew_it_runs_and_a_strict_project_finds_its_types(built, kind, tmp_path):
+    (archive,) = built.glob(kind)
+    variables = runpy.run_path(str(ROOT / "packaging" / "start.py"))["environment"]()
+
+    def run(*command):
+        done = subprocess.run(
+            [str(word) for word in command],
+            cwd=tmp_path,
+            env=variables,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, done.stdout + done.stderr
+        return done.stdout
+
+    # No network: what it needs is that of this Python.
+    run(sys.executable, "-m", "venv", "--without-pip", "venv")
+    (site,) = tmp_path.glob("venv/lib/*/site-packages")
+    others = [place for place in sys.path if place.endswith("-packages")]
+    (site / "others.pth").write_text("\n".join(others))
+    programs = tmp_path / "venv" / "bin"
+    pip = (sys.executable, "-m", "pip", "--python", programs / "python", "install", "--no-index")
+    run(*pip, "--no-deps", "--no-build-isolation", "--ignore-installed", archive)
+
+    assert run(programs / "kappaskin", "--version") == VERSION + "\n"
+    assert "--source" in run(programs / "kappaskin", "app", "--help")
+    code = "import kappaskin as k, kappaskin_app as a; print(k.__version__, k.__file__, a.__file__)"
+    version, *files = run(programs / "python", "-c", code).split()
+    assert version == VERSION
+    assert all(Path(file).is_relative_to(site) for file in files)
+
+    shutil.copy(ROOT / "tests" / "user_script.py", tmp_path)
+    settings = {"typeCheckingMode": "strict", "include": ["user_script.py"], "venv": "venv"}
+    (tmp_path / "pyrightconfig.json").write_text(json.dumps(settings | {"venvPath": "."}))
+    assert "0 errors, 0 warnings" in run(sys.executable, "-m", "basedpyright", "-p", tmp_path)
 
 
 def test_constraints_are_pins_without_an_address():
@@ -106,6 +217,32 @@ def test_start_needs_the_standard_library_alone():
 
     assert "subprocess" in imported
     assert imported <= sys.stdlib_module_names
+
+
+def test_a_python_that_is_too_old_is_told_in_a_line_what_to_do(monkeypatch):
+    start = runpy.run_path(str(ROOT / "packaging" / "start.py"))
+    known = start["set_up"].__globals__
+    ast.parse((ROOT / "packaging" / "start.py").read_text("utf-8"), feature_version=(3, 8))
+    monkeypatch.setitem(known, "OLDEST", (3, 99))
+
+    for names, remedy in (
+        ([], r"install a newer one \(Debian 12, .*\)"),
+        (
+            ["false", Path(sys.executable).name],
+            rf"start with {Path(sys.executable).name} .*py",
+        ),
+    ):
+        monkeypatch.setitem(known, "named_pythons", lambda names=names: names)
+        with pytest.raises(start["Stop"], match=rf"^expected Python 3\.99 or newer, .*; {remedy}$"):
+            start["set_up"]()
+
+
+def test_a_dependency_group_is_read_with_those_that_it_includes():
+    group = runpy.run_path(str(ROOT / "packaging" / "start.py"))["group"]
+    groups = PROJECT["dependency-groups"]
+
+    assert group("bundle") == groups["bundle"]
+    assert sorted(group("dev")) == sorted([*groups["dev"][1:], *groups["compare"]])
 
 
 def test_every_task_is_told_in_its_help_and_to_those_who_contribute():

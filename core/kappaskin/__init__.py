@@ -63,8 +63,10 @@ if TYPE_CHECKING:
     from kappaskin.skin import Patch as Patch
     from kappaskin.skin import Polygon as Polygon
     from kappaskin.sources import feed as feed
+
+    __version__: str
 else:
-    __getattr__, __dir__, __all__ = lazy_names(
+    _room_name, __dir__, __all__ = lazy_names(
         __name__,
         ("bases", "SineBasis basis_for"),
         ("calibration", "Calibration Tare load_calibration"),
@@ -85,3 +87,10 @@ else:
         ("skin", "Cap Disk Patch Polygon"),
         ("sources", "feed"),
     )
+
+    def __getattr__(name):
+        if name != "__version__":
+            return _room_name(name)
+        from importlib import metadata  # 40 ms that few need
+
+        return metadata.version(__name__)

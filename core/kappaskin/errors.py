@@ -29,6 +29,11 @@ class Damaged(Refusal):
 
 def lacking(extra: str, purpose: str, error: ImportError) -> Refusal:
     """What to say where a package of an optional `extra` is missing, which a `purpose` needs."""
+    return missing(f"kappaskin[{extra}]", purpose, error)
+
+
+def missing(package: str, purpose: str, error: ImportError) -> Refusal:
+    """What to say where a `package` is not installed that a `purpose` needs."""
     where = ", which is not in this bundle; in your own Python" if hasattr(sys, "frozen") else ""
     what = error.name or error
-    return Refusal(f"{purpose} needs {what}{where}: pip install 'kappaskin[{extra}]'")
+    return Refusal(f"{purpose} needs {what}{where}: pip install '{package}'")

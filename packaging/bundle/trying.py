@@ -9,10 +9,14 @@ import subprocess
 import sys
 import tempfile
 import time
+from importlib import metadata
 from pathlib import Path
+
+from PIL import Image
 
 _SHOWN = 4.0  # s that a window stays
 _LONGEST = 180.0  # s for one command
+_FLAT = 256  # colours at most where nothing is shaded
 _APART = ["unshare", "--net"]  # no network but its own
 
 
@@ -41,7 +45,7 @@ class Trial:
 
     def run_all(self) -> None:
         self._measure()
-        self.expect("--version")
+        self.tell_version()
         self.expect("--help")  # which loads every command, by its name
         told = json.loads(self.expect("doctor", "--json") or "{}")
         if None in told.get("packages", {"": None}).values() or told["missing"]:
@@ -59,6 +63,12 @@ class Trial:
             self.expect("drill")  # a device and an engine by -m
         if left := _running(self.bundle):
             self.failures.append(f"left running: {left}")
+
+    def tell_version(self) -> None:
+        """Have it tell the version that was built."""
+        told, wanted = self.expect("--version").strip(), metadata.version("kappaskin")
+        if told != wanted:
+            self.failures.append(f"--version: expected {wanted}, got {told!r}")
 
     def expect(self, *arguments: str) -> str:
         """What a command printed; it is noted where it failed."""
@@ -93,6 +103,10 @@ class Trial:
             took = picture.stat().st_mtime - began - _SHOWN
             print(f"          window, {name}: after {took:.1f} s")
             shutil.copy(picture, self.bundle.parent)
+            width, height = (image := Image.open(picture).convert("RGB")).size
+            skin = image.crop((width // 3, height // 3, 2 * width // 3, 2 * height // 3))
+            if skin.getcolors(_FLAT):
+                self.failures.append(f"no skin is drawn in the window ({name})")
         else:
             self.failures.append(f"no picture of the window ({name})")
 

@@ -195,7 +195,7 @@ def compare(*, json: Switch = False) -> None:
     """Compare with other software on the same problems: error, time and memory side by side.
 
     NumPy's and SciPy's least squares and scikit-fem's finite elements, each configured as well as
-    possible. Needs `kappaskin[compare]`; takes some seconds.
+    possible. Needs scikit-fem; takes some seconds.
 
     Example: `kappaskin compare --json`
 
@@ -320,7 +320,7 @@ def study(
         Number of worker processes; the number of cores when left out.
     scheduler
         The address of a Dask scheduler whose workers compute, such as tcp://10.0.0.5:8786; needs
-        kappaskin[dask] here and there.
+        kappaskin[cluster] here and there.
     out
         The folder of its results; named as the study when left out.
     """

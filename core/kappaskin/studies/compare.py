@@ -13,7 +13,7 @@ from scipy.interpolate import make_interp_spline
 from scipy.sparse.linalg import SuperLU, lsqr, splu
 
 from kappaskin.bases import SineBasis, basis_for
-from kappaskin.errors import lacking
+from kappaskin.errors import missing
 from kappaskin.estimation import column_lengths, estimator_for
 from kappaskin.frames import Array, Mask
 from kappaskin.mechanics import GaussianLoad, Plate
@@ -112,7 +112,7 @@ def scikit_fem() -> Any:
     try:
         return importlib.import_module("skfem")
     except ImportError as error:
-        raise lacking("compare", "a comparison", error) from error
+        raise missing("scikit-fem", "a comparison", error) from error
 
 
 def axes(sides: tuple[float, float], cells: int) -> list[Array]:

@@ -133,7 +133,7 @@ def test_without_scikit_fem_it_says_what_to_install(monkeypatch, capsys):
 
     assert main(["compare"]) == REFUSED
 
-    assert "pip install 'kappaskin[compare]'" in capsys.readouterr().err
+    assert "pip install 'scikit-fem'" in capsys.readouterr().err
 
 
 def test_the_command_prints_the_table_or_its_rows(rows, monkeypatch, capsys):

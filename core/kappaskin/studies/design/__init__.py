@@ -121,7 +121,7 @@ def cluster(address: str) -> Generator[Workers]:
     try:
         distributed: Any = import_module("distributed")
     except ImportError as error:
-        raise lacking("dask", "a scheduler", error) from error
+        raise lacking("cluster", "a scheduler", error) from error
     try:
         _check_connection(address)
         client = distributed.Client(address, timeout=_PATIENCE, set_as_default=False)
@@ -166,7 +166,7 @@ def _check_workers(client: Any, address: str) -> None:
     except Exception as error:  # whatever a worker without kappaskin, or with an old one, raises
         raise Refusal(
             f"{address}: expected workers with {version()}, got some of unknown version "
-            f"({error}); install the same kappaskin[dask] there"
+            f"({error}); install the same kappaskin[cluster] there"
         ) from error
     alike = f"{version()}, threads of BLAS 1"
     if others := {worker: other for worker, other in kinds.items() if other != alike}:
