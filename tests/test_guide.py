@@ -325,6 +325,19 @@ def test_every_page_is_in_the_contents_and_in_one_order() -> None:
     assert sorted(listed) == sorted(page.name for page in PAGES[1:] if page.name != "README.md")
 
 
+def test_the_page_on_plug_ins_shows_what_the_command_writes(tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    blocks = blocks_of(GUIDE / "plug-ins.md")
+    commands = [line for block in blocks if block.kind == "sh" for line in commands_of(block)]
+    for line in commands:
+        if line.startswith("kappaskin new "):
+            assert main(line.split()[1:]) == 0
+    shown = [block.text.partition("\n") for block in blocks if block.kind in ("toml", "python")]
+    assert len(shown) == 10
+    for name, _, text in shown:
+        assert (tmp_path / name.removeprefix("# ")).read_text("utf-8") == text, name
+
+
 def test_the_validation_page_lists_every_drill_as_passed() -> None:
     table = (GUIDE / "validation.md").read_text("utf-8").partition("| drill |")[2]
     for file in (Path(__file__).parent / "drills").glob("drill_*.py"):
