@@ -92,6 +92,8 @@ class Shell:
             case ["pip", "install", what]:
                 assert re.fullmatch(r"kappaskin\[(\w+)\]", what)[1] in _extras()
                 return ""
+            case ["python", "-m", module, *rest] if module.startswith("kappaskin_resources."):
+                return _ran(sys.executable, "-m", module, *rest)
             case ["python3", "packaging/start.py", *task]:
                 assert f"def {(task or ['app'])[0]}(" in _start()
                 return ""
@@ -109,7 +111,7 @@ class Shell:
                 printed = _printed(lambda: codes.append(main(rest)))
                 assert codes == [asked], f"{line}: exit code {codes}\n{printed}"
                 return self._said(printed)
-        raise AssertionError(f"{line}: expected kappaskin, pip or packaging/start.py")
+        raise AssertionError(f"{line}: expected kappaskin, pip, a module or packaging/start.py")
 
     def _install(self, package: str) -> None:
         """Install a plug-in where processes that are started from now on find it."""
