@@ -92,6 +92,8 @@ class Shell:
             case ["pip", "install", what]:
                 assert re.fullmatch(r"kappaskin\[(\w+)\]", what)[1] in _extras()
                 return ""
+            case ["python", "-m", module, *rest] if module.startswith("kappaskin_resources."):
+                return _ran(sys.executable, "-m", module, *rest)
             case ["python3", "packaging/start.py", *task]:
                 assert f"def {(task or ['app'])[0]}(" in _start()
                 return ""
@@ -109,7 +111,7 @@ class Shell:
                 printed = _printed(lambda: codes.append(main(rest)))
                 assert codes == [asked], f"{line}: exit code {codes}\n{printed}"
                 return self._said(printed)
-        raise AssertionError(f"{line}: expected kappaskin, pip or packaging/start.py")
+        raise AssertionError(f"{line}: expected kappaskin, pip, a module or packaging/start.py")
 
     def _install(self, package: str) -> None:
         """Install a plug-in where processes that are started from now on find it."""
@@ -323,6 +325,19 @@ def test_every_page_is_in_the_contents_and_in_one_order() -> None:
     contents = (GUIDE / "README.md").read_text("utf-8")
     listed = re.findall(r"^\d+\. \[[^\]]+\]\(([\w-]+\.md)\)", contents, re.MULTILINE)
     assert sorted(listed) == sorted(page.name for page in PAGES[1:] if page.name != "README.md")
+
+
+def test_the_page_on_plug_ins_shows_what_the_command_writes(tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    blocks = blocks_of(GUIDE / "plug-ins.md")
+    commands = [line for block in blocks if block.kind == "sh" for line in commands_of(block)]
+    for line in commands:
+        if line.startswith("kappaskin new "):
+            assert main(line.split()[1:]) == 0
+    shown = [block.text.partition("\n") for block in blocks if block.kind in ("toml", "python")]
+    assert len(shown) == 10
+    for name, _, text in shown:
+        assert (tmp_path / name.removeprefix("# ")).read_text("utf-8") == text, name
 
 
 def test_the_validation_page_lists_every_drill_as_passed() -> None:

@@ -39,7 +39,7 @@ _PANELS = {
     "Sensor": ("sensor", "calibrate tare press monitor device"),
     "Studies": ("study", "plan simulate cost compare stability regions design study report"),
     "Paper": ("study", "tables figures"),
-    "System": ("system", "doctor drill"),
+    "System": ("system", "doctor drill new"),
 }
 _GROUPS = {panel: Group(panel, sort_key=place) for place, panel in enumerate(_PANELS, 1)}
 for _panel, (_module, _names) in _PANELS.items():

@@ -1,13 +1,17 @@
-"""Commands on this machine and its ports: doctor, drill, and completion in a shell."""
+"""Commands on this machine and its ports: doctor, drill, new plug-ins, completion in a shell."""
 
 import ctypes
 import math
 import os
 import platform
+import re
 import shutil
 import sys
 from dataclasses import asdict
 from importlib import metadata
+from importlib.resources import files
+from importlib.util import find_spec
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from kappaskin.cli.common import FAILED, ProgressLine, Switch, lined, print_result, show
@@ -213,6 +217,78 @@ def drill(source: str = "", *, json: Switch = False, long: Switch = False) -> in
         rows = run_drills(source or None, long, show_progress)
     print_result(rows, json, lambda: drills_text(rows))
     return FAILED if any(row["verdict"] == "failed" for row in rows) else 0
+
+
+# The plug-in that each template is, and as which its name is taken.
+_TEMPLATES = {
+    "sensor": ("tilt", "a scheme of a source"),
+    "effect": ("lag", "an effect"),
+    "estimator": ("ridge", "an estimator"),
+    "feature": ("peak", "a feature of the app"),
+}
+
+
+def _is_taken(kind: str, name: str) -> bool:
+    """Whether a plug-in of this `name` would be left out."""
+    from kappaskin.estimation import METHODS
+    from kappaskin.scenes.effects import EFFECTS
+    from kappaskin.sources import own_schemes
+
+    if kind == "feature":  # core never imports the app: its features are folders
+        app = find_spec("kappaskin_app")
+        places = (app and app.submodule_search_locations) or []
+        return any((Path(place) / "features" / name).is_dir() for place in places)
+    return name in {"sensor": own_schemes(), "effect": EFFECTS, "estimator": METHODS}[kind]
+
+
+def new(kind: Literal["sensor", "effect", "estimator", "feature"], name: str, /) -> None:
+    """Write a package of a plug-in, with a test, to a new folder here.
+
+    It works as it is: change its code to yours. `pip install -e ./kappaskin-NAME` installs it,
+    `pytest kappaskin-NAME` tests it, and `kappaskin doctor` lists it.
+
+    Example: `kappaskin new estimator ridge`
+
+    Parameters
+    ----------
+    kind
+        What it adds: a source of frames, an effect in simulations, an estimator of shapes, or a
+        feature of the app.
+    name
+        Its name: lower-case letters, digits and single hyphens.
+    """
+    from kappaskin._files import write_whole
+
+    example, taken = _TEMPLATES[kind]
+    if not re.fullmatch(r"[a-z][a-z0-9]*(-[a-z0-9]+)*", name) or len(name) > 40:
+        raise Refusal(
+            "expected a name of a letter, then letters, digits and single hyphens, all lower-case "
+            f"and 40 at most, such as {example}, got {name!r:.60}"
+        )
+    folder, module = Path(f"kappaskin-{name}"), f"kappaskin_{name.replace('-', '_')}"
+    if find_spec(module):
+        raise Refusal(f"the module {module} is installed already; choose another name")
+    if _is_taken(kind, name):
+        raise Refusal(f"{name} is {taken} of Kappaskin already; choose another name")
+    words = {
+        f"kappaskin_{example}": module,
+        example.title(): name.title().replace("-", ""),
+        example: name,
+    }
+
+    def named(text: str) -> str:
+        return re.sub("|".join(words), lambda found: words[found[0]], text)
+
+    try:
+        folder.mkdir()
+    except FileExistsError as error:
+        raise Refusal(f"{folder} is here already; choose another name, or remove it") from error
+    except OSError as error:
+        raise Refusal(f"{folder} cannot be written ({error.strerror}); go elsewhere") from error
+    for file in (files("kappaskin_resources") / "templates" / kind).iterdir():
+        if file.is_file():  # pip adds a folder of compiled modules
+            write_whole(folder / named(file.name), named(file.read_text("utf-8")))
+    show(f"{folder}: written; `pip install -e ./{folder}` installs it")
 
 
 def install_completion(

@@ -46,5 +46,6 @@ from kappaskin.sources.source import Source as Source
 from kappaskin.sources.source import is_finger as is_finger
 from kappaskin.sources.source import named_sources as named_sources
 from kappaskin.sources.source import open_source as open_source
+from kappaskin.sources.source import own_schemes as own_schemes
 from kappaskin.sources.source import plugged_source as plugged_source
 from kappaskin.sources.source import register_scheme as register_scheme

@@ -129,8 +129,12 @@ def register_scheme(scheme: str, opened: Callable[[str, bool], Source]) -> None:
 
 @cache
 def _plugged() -> dict[str, Callable[[str, Path | None], Source]]:
-    ours = {scheme.removesuffix(":") for scheme in _schemes} | {"replay", "udp"}
-    return plug_ins(SOURCES, _check, ours)
+    return plug_ins(SOURCES, _check, own_schemes())
+
+
+def own_schemes() -> set[str]:
+    """The schemes that no plug-in may open."""
+    return {scheme.removesuffix(":") for scheme in _schemes} | {"hand", "replay", "udp"}
 
 
 def _check(name: str, made: object) -> None:

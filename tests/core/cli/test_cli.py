@@ -298,7 +298,7 @@ def test_every_subcommand_shows_an_example_in_its_help(run) -> None:
         ("Studies", {"plan", "simulate", "cost", "compare", "stability", "regions", "study",
                      "report", "design"}),
         ("Paper", {"tables", "figures"}),
-        ("System", {"doctor", "drill"}),
+        ("System", {"doctor", "drill", "new"}),
     ],
 )  # fmt: skip
 def test_the_help_shows_the_commands_in_panels(run, panel, commands) -> None:
