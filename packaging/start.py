@@ -15,6 +15,7 @@
                                                    do its tests notice?
     python3 packaging/start.py core [ARGUMENTS]    tests the library where no GUI is installed;
                                                    --python python3.12 with another Python
+    python3 packaging/start.py docs                makes the site in dist/docs
     python3 packaging/start.py bundle [--try]      makes the app one folder; --try only tries it
 
 Needs Linux and Python 3.11 or newer. A second start with nothing changed installs nothing.
@@ -81,6 +82,7 @@ RELEASE = (
     ("fuzz", "120"),
     ("drill",),
     ("bench",),
+    ("docs",),
     ("bundle",),
 )
 
@@ -226,6 +228,15 @@ def bundle(arguments: list[str], shown: dict[str, str]) -> int:
     return run([tool("python"), str(ROOT / "packaging/bundle/build.py"), *arguments], shown)
 
 
+def docs(arguments: list[str], shown: dict[str, str]) -> int:
+    """Make the site: guide, lessons, notebooks and reference, with their links checked."""
+    import tomllib
+
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
+    install(VENV, str(ROOT), *project["dependency-groups"]["docs"], keep=True)
+    return run([tool("python"), str(ROOT / "packaging/docs/build.py"), *arguments], shown)
+
+
 def mutate(arguments: list[str], shown: dict[str, str]) -> int:
     """Change a room of the core in one place at a time, and say what no test notices."""
     return run([tool("python"), str(ROOT / "tests" / "mutation" / "mutate.py"), *arguments], shown)
@@ -233,7 +244,7 @@ def mutate(arguments: list[str], shown: dict[str, str]) -> int:
 
 TASKS = {
     task.__name__: task
-    for task in (app, test, full, lint, fast, cover, bench, fuzz, drill, mutate, core, bundle)
+    for task in (app, test, full, lint, fast, cover, bench, fuzz, drill, mutate, core, docs, bundle)
 }
 
 

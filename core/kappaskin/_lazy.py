@@ -27,3 +27,19 @@ def lazy_names(
         return sorted({*vars(sys.modules[package]), *module_of})
 
     return find, names, list(module_of)
+
+
+class Displayed:
+    """A value that a notebook shows as a table, with a picture where Matplotlib is installed."""
+
+    __slots__ = ()
+
+    def _repr_html_(self) -> str:
+        return import_module("kappaskin.studies.notebook").html_of(self)
+
+    def plot(self) -> Any:
+        """Draw it as a new figure of pyplot: the `matplotlib.axes.Axes`.
+
+        Raises a `Refusal` without Matplotlib, and where there is nothing to draw.
+        """
+        return import_module("kappaskin.studies.notebook").plotted(self)

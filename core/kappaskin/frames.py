@@ -7,6 +7,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from kappaskin._lazy import Displayed
 from kappaskin._text import NO_FORCE, SNAPS
 
 Array = NDArray[np.float64]
@@ -248,7 +249,7 @@ class LocalGeometry:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Estimate:
+class Estimate(Displayed):
     """Everything a view, a publisher or a file may show of one frame.
 
     `nominal` (3, P) in 1/m is what this frame brought as Eq. 8 reads it, whatever calibration and

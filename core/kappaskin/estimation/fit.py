@@ -10,6 +10,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
+from kappaskin._lazy import Displayed
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.sensing import SensorLayout
@@ -186,7 +187,7 @@ def _root(variance: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class Fit(Displayed):
     """The shape that explains the readings best, of one frame or of T (leading axis).
 
     `readings` (..., 3, P) in 1/m are those used, NaN where one is missing or excluded;

@@ -34,6 +34,7 @@ from mcap.records import (
 )
 
 from kappaskin._files import Budget, open_file
+from kappaskin._lazy import Displayed
 from kappaskin.errors import Damaged, Refusal
 from kappaskin.frames import Array, Event
 from kappaskin.pipeline import REVISION
@@ -217,7 +218,7 @@ class ChunkAt(NamedTuple):
     channels: frozenset[int]
 
 
-class Recording:
+class Recording(Displayed):
     """The recording at `path`, open until `close`; a `Refusal` for any other file.
 
     `whole` says whether it was ended as it should be; one that was not is read up to where it

@@ -212,12 +212,15 @@ def draw_study(study: Study, known: Sequence[PointResults]) -> dict[str, str]:
     """The SVG of a figure for every measure, by its name; none where nothing is varied."""
     drawn = dict[str, str]()
     for name in study.measures if study.axes else ():
-        files = style.drawn(partial(_draw, study, known, name), "svg")
+        files = style.drawn(partial(draw_measure, study, known, name), "svg")
         drawn[name] = files["svg"].decode()
     return drawn
 
 
-def _draw(study: Study, known: Sequence[PointResults], name: str, figure: style.Figure) -> None:
+def draw_measure(
+    study: Study, known: Sequence[PointResults], name: str, figure: style.Figure
+) -> None:
+    """The means of a measure against the first thing that is varied."""
     style.resize(figure, style.DOUBLE, 80)
     (first, *others), measure = study.axes, MEASURES[name]
     left, bottom, width, height = _PANEL

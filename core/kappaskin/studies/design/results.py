@@ -16,6 +16,7 @@ import numpy as np
 import scipy
 
 from kappaskin._files import read_file, replacing, write_whole
+from kappaskin._lazy import Displayed
 from kappaskin.errors import Refusal
 from kappaskin.estimation import Estimator
 from kappaskin.frames import Array
@@ -273,7 +274,7 @@ _LARGEST = 2**22  # bytes of a file of a study
 _TEXT = "study.toml"
 
 
-class StudyFolder:
+class StudyFolder(Displayed):
     """Results by task, at `path`; each file is written whole or not at all.
 
     A task whose parameters, block, measures and version are those of an earlier one finds its

@@ -16,6 +16,7 @@ from typing import Any, cast
 import numpy as np
 import scipy
 
+from kappaskin._lazy import Displayed
 from kappaskin._toml import TomlTable, parsed
 from kappaskin.errors import Refusal
 from kappaskin.estimation import (
@@ -458,7 +459,7 @@ class Point:
 
 
 @dataclass(frozen=True, eq=False)
-class Study:
+class Study(Displayed):
     """A study, as its file's `text` describes it; `base` is the setup before anything varies."""
 
     name: str

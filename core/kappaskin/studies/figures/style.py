@@ -4,6 +4,7 @@ import io
 import re
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -81,13 +82,16 @@ def loaded() -> Any:
 
 
 @contextmanager
-def sheet() -> Generator[Figure]:
-    """An empty figure, to be drawn and saved inside the context, whatever the user's own style."""
+def sheet(pyplot: bool = False) -> Generator[Figure]:
+    """An empty figure, to be drawn and saved inside the context, whatever the user's own style.
+
+    Of `pyplot` it is one that a notebook or a window shows.
+    """
     mpl = loaded()
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(_RULES)
-        yield mpl.figure.Figure()
+        yield import_module("matplotlib.pyplot").figure() if pyplot else mpl.figure.Figure()
 
 
 def drawn(draw: Callable[[Figure], None], *kinds: str) -> dict[str, bytes]:

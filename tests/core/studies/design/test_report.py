@@ -165,3 +165,12 @@ def test_a_mean_has_the_digits_that_are_known(mean, half, told):
 )
 def test_values_are_told_briefly(value, told):
     assert value_text(value) == told
+
+
+def test_a_notebook_shows_the_results_as_the_report_does(folder):
+    results = StudyFolder(folder)
+    shown, study = results._repr_html_(), results.study()
+
+    assert shown.count("<tr>") == 1 + study.count
+    assert MEASURES[study.measures[0]].title in shown
+    assert "data:image/png" in shown
