@@ -15,6 +15,7 @@ DEVELOPERS = {"dev", "bundle"}  # what works on the library, not what it works w
 MODULES = {
     "PySide6-Essentials": ("PySide6", "shiboken6"),
     "imageio-ffmpeg": ("imageio_ffmpeg",),
+    "rerun-sdk": ("rerun",),
     "scikit-fem": ("skfem",),
     "vtk": ("vtk", "vtkmodules"),
 }
@@ -24,6 +25,7 @@ ASKS = {
     "dask": ["study", "paper-elements", "--scheduler", "tcp://127.0.0.1:1", "--out", "study"],
     "hdf5": ["export", "{recording}", "--to", "out.h5"],
     "compare": ["compare"],
+    "rerun": ["export", "{recording}", "--to", "out.rrd"],
     "foxglove": ["publish", "sim:", "--seconds", "30", "--foxglove", "127.0.0.1:8765"],
 }
 """What asks for each extra but `film`, `gamepad` and `parquet`, which need more than words.

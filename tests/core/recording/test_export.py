@@ -677,7 +677,8 @@ def test_a_full_disk_is_told_of(taps, tmp_path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("suffix", "module", "extra"), [(".h5", "h5py", "hdf5"), (".parquet", "pyarrow", "parquet")]
+    ("suffix", "module", "extra"),
+    [(".h5", "h5py", "hdf5"), (".parquet", "pyarrow", "parquet"), (".rrd", "rerun", "rerun")],
 )
 def test_without_its_package_the_line_that_installs_it_is_told(
     suffix: str, module: str, extra: str, taps, tmp_path, monkeypatch
