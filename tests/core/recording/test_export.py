@@ -21,6 +21,7 @@ import numpy as np
 import pytest
 import trimesh
 from mcap.writer import Writer
+from rosbags.highlevel import AnyReader
 from scipy.spatial import KDTree
 
 from kappaskin import (
@@ -50,7 +51,7 @@ from kappaskin.recording import (
 from kappaskin.recording.cdr import decode
 from kappaskin.recording.export.surfaces import SkinMesh, SkinSurface
 from kappaskin.recording.export.writing import export_steps
-from kappaskin.recording.messages import SECOND_CONTACT, SECONDS, TOPICS
+from kappaskin.recording.messages import CONTACTS, SECOND_CONTACT, SECONDS, TOPICS
 from kappaskin.sources import SimulatedSource, VirtualClock
 
 pytestmark = pytest.mark.slow
@@ -224,6 +225,24 @@ def test_a_verdict_finds_the_recording_the_same(taps) -> None:
     assert isinstance(verdict, Verification)
     assert verdict.same
     assert verdict.compared > len(taps[1])
+
+
+def test_rosbags_reads_every_contact_of_a_recording(taps) -> None:
+    recording, told = taps
+    with AnyReader([recording]) as reader:
+        of = {each.topic: each for each in reader.connections}
+        assert set(of) == {topic.name for topic in TOPICS}
+        found = [
+            reader.deserialize(raw, each.msgtype)
+            for each, _, raw in reader.messages([of[CONTACTS.name]])
+        ]
+        poses = list(reader.messages([of["/kappaskin/pose"]]))
+    assert [got.sequence for got in found] == [one.frame.sequence for one in told]
+    want = [one.estimate.contact for one in told]
+    np.testing.assert_array_equal([got.force for got in found], [one.force for one in want])
+    np.testing.assert_array_equal([got.position for got in found], [one.position for one in want])
+    assert {got.header.frame_id for got in found} == {"skin"}
+    assert poses
 
 
 def test_two_contacts_are_recorded_and_verified(tmp_path) -> None:
