@@ -15,6 +15,7 @@ OTHERS = {"compare": "scikit-fem"}  # what is asked for under its own name
 MODULES = {
     "PySide6-Essentials": ("PySide6", "shiboken6"),
     "imageio-ffmpeg": ("imageio_ffmpeg",),
+    "rerun-sdk": ("rerun",),
     "scikit-fem": ("skfem",),
     "vtk": ("vtk", "vtkmodules"),
 }
@@ -24,6 +25,7 @@ ASKS = {
     "cluster": ["study", "paper-elements", "--scheduler", "tcp://127.0.0.1:1", "--out", "study"],
     "hdf5": ["export", "{recording}", "--to", "out.h5"],
     "compare": ["compare"],
+    "rerun": ["export", "{recording}", "--to", "out.rrd"],
     "foxglove": ["publish", "sim:", "--seconds", "30", "--foxglove", "127.0.0.1:8765"],
 }
 """What asks for what is optional, but `film`, `gamepad` and `parquet`: they need more than words.

@@ -47,6 +47,7 @@ def publish(
     udp: Many = None,
     cue: Many = None,
     foxglove: Perhaps = None,
+    rerun: Perhaps = None,
     allow_origin: Many = None,
     seconds: float = math.inf,
     sensor: DescribedFingers = None,
@@ -83,6 +84,9 @@ def publish(
         a hand each finger has a server of its own, at ports that follow each other. At
         an address that other machines reach, such as 0.0.0.0, it asks for a token: the URL with it
         is printed, and KAPPASKIN_TOKEN in the environment sets it.
+    rerun
+        Send to the viewer of Rerun at HOST:PORT, or without one at 127.0.0.1:9876; start it first
+        with `rerun`.
     allow_origin
         Origin of web pages that may connect, besides those of this machine:
         https://app.foxglove.dev is Foxglove in the browser, file:// its desktop app; may be given
@@ -102,8 +106,11 @@ def publish(
     targets = [f"udp://{place}" for place in udp or ()]
     targets += [f"cue://{place}" for place in cue or ()]
     targets += [f"foxglove://{place}" for place in places or ()]
+    targets += [f"rerun://{place}" for place in (rerun if rerun != [] else [""]) or ()]
     if not targets:
-        raise Refusal("expected a receiver: give --udp HOST:PORT, --cue HOST:PORT or --foxglove")
+        raise Refusal(
+            "expected a receiver: give --udp HOST:PORT, --cue HOST:PORT, --foxglove or --rerun"
+        )
     if allow_origin and not places:
         raise Refusal("--allow-origin is for pages that connect to a server: give --foxglove")
     targets_of(targets)  # or refused here

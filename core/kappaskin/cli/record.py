@@ -428,7 +428,8 @@ def export(
     The suffix selects the format. A .parquet, .csv, .npz or .h5 has a row for each frame,
     recomputed from the recorded bytes with the recorded settings; the preset selects its columns.
     A .vtp or .stl is the skin in space at one moment, a .pvd a series of .vtp files. A .glb (glTF)
-    is the skin at one moment, as it moves with the time between two shapes, or at its deepest.
+    is the skin at one moment, as it moves with the time between two shapes, or at its deepest. A
+    .rrd has all that Rerun shows: the skin, the contact, readings and numbers over time.
     Every file states units, settings, calibration, tare and device. Of a hand each finger has a
     file of its own, named as TO and the finger: press-thumb.csv; exit code 1 if there is none of
     one of them.

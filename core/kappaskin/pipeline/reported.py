@@ -286,6 +286,12 @@ class ReportedQuantity:
         )
         return tuple((suffix, text, _got(get)) for suffix, text, get in of if get is not None)
 
+    def named_axes(self, lengths: Axes) -> list[tuple[str, tuple[str, ...]]]:
+        """What is along each axis, and the labels there."""
+        names = [part if isinstance(part, str) else "component" for part in self.parts]
+        labels = self._axes(lengths)
+        return list(zip(names if len(names) == len(labels) else [_READING], labels, strict=True))
+
     def _axes(self, lengths: Axes) -> list[tuple[str, ...]]:
         """The labels along each axis."""
         if self.of_readings and isinstance(names := lengths.get(_READING), tuple):

@@ -69,8 +69,8 @@ class Publisher(Protocol):
 MOST_TARGETS = 8
 """Targets published to at the same time, at most."""
 
-PORTS = {"udp": 9870, "foxglove": 8765, "cue": 9871}  # PlotJuggler's and Foxglove's own
-_HOSTS = {"udp": "", "foxglove": "127.0.0.1", "cue": ""}
+PORTS = {"udp": 9870, "foxglove": 8765, "cue": 9871, "rerun": 9876}  # but for cue, viewers' own
+_HOSTS = {"udp": "", "foxglove": "127.0.0.1", "cue": "", "rerun": "127.0.0.1"}
 _SERVERS = ("foxglove",)
 _FORM = re.compile(
     r"(\w+)://(?:\[([0-9a-fA-F:.]+(?:%[\w.-]+)?)\]|([\w.-]*))"  # IPv6, or a name
@@ -110,7 +110,7 @@ def target_of(text: str) -> Target:
     scheme = found[1].lower() if found else ""
     if found is None or scheme not in PORTS or (found[5] and scheme != "cue"):
         raise Refusal(
-            "expected a target such as udp://127.0.0.1:9870, foxglove:// or "
+            "expected a target such as udp://127.0.0.1:9870, foxglove://, rerun:// or "
             f"cue://127.0.0.1:9871?force=2, got {text[:99]!r}"
         )
     host = (found[2] or found[3] or _HOSTS[scheme]).lower()

@@ -4,8 +4,9 @@ from kappaskin.recording.cdr import MessageLayout as MessageLayout
 from kappaskin.recording.disk import ReservedFile as ReservedFile
 from kappaskin.recording.disk import is_written as is_written
 from kappaskin.recording.export.request import PRESETS as PRESETS
-from kappaskin.recording.export.request import SURFACES as SURFACES
+from kappaskin.recording.export.request import TABLES as TABLES
 from kappaskin.recording.export.request import ExportRequest as ExportRequest
+from kappaskin.recording.export.rerun_stream import RerunStream as RerunStream
 from kappaskin.recording.export.writing import Exported as Exported
 from kappaskin.recording.export.writing import ExportTask as ExportTask
 from kappaskin.recording.export.writing import Forecast as Forecast

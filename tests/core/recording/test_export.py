@@ -21,6 +21,7 @@ import numpy as np
 import pytest
 import trimesh
 from mcap.writer import Writer
+from rosbags.highlevel import AnyReader
 from scipy.spatial import KDTree
 
 from kappaskin import (
@@ -50,7 +51,7 @@ from kappaskin.recording import (
 from kappaskin.recording.cdr import decode
 from kappaskin.recording.export.surfaces import SkinMesh, SkinSurface
 from kappaskin.recording.export.writing import export_steps
-from kappaskin.recording.messages import SECOND_CONTACT, SECONDS, TOPICS
+from kappaskin.recording.messages import CONTACTS, SECOND_CONTACT, SECONDS, TOPICS
 from kappaskin.sources import SimulatedSource, VirtualClock
 
 pytestmark = pytest.mark.slow
@@ -136,7 +137,7 @@ def columns_in(path: Path) -> dict[str, np.ndarray]:
         with np.load(path) as arrays:
             return {name: arrays[name] for name in arrays.files if name != "about"}
     with h5py.File(path) as file:
-        return {name: file[name][:] for name in file}
+        return {name: file[name][:] for name in file if name not in ("README", "axes")}
 
 
 OF_ESTIMATE: dict[str, Callable[[Estimate], object]] = {
@@ -226,6 +227,24 @@ def test_a_verdict_finds_the_recording_the_same(taps) -> None:
     assert verdict.compared > len(taps[1])
 
 
+def test_rosbags_reads_every_contact_of_a_recording(taps) -> None:
+    recording, told = taps
+    with AnyReader([recording]) as reader:
+        of = {each.topic: each for each in reader.connections}
+        assert set(of) == {topic.name for topic in TOPICS}
+        found = [
+            reader.deserialize(raw, each.msgtype)
+            for each, _, raw in reader.messages([of[CONTACTS.name]])
+        ]
+        poses = list(reader.messages([of["/kappaskin/pose"]]))
+    assert [got.sequence for got in found] == [one.frame.sequence for one in told]
+    want = [one.estimate.contact for one in told]
+    np.testing.assert_array_equal([got.force for got in found], [one.force for one in want])
+    np.testing.assert_array_equal([got.position for got in found], [one.position for one in want])
+    assert {got.header.frame_id for got in found} == {"skin"}
+    assert poses
+
+
 def test_two_contacts_are_recorded_and_verified(tmp_path) -> None:
     path = tmp_path / "two.mcap"
     told = recorded(path, load_scene("two-contacts"), (Setup(nx=9, ny=7),), 0.1)
@@ -267,8 +286,16 @@ def test_an_hdf5_column_has_its_unit(taps, tmp_path) -> None:
     export(taps[0], tmp_path / "out.h5")
     with h5py.File(tmp_path / "out.h5") as file:
         assert file["curvature"].attrs["unit"] == "1/m"
+        assert "force [N]: " in file["README"].asstr()[()]
+        np.testing.assert_array_equal(file["curvature"].dims[0]["time"][:], file["time"][:])
+        assert [*file["curvature"].dims[1]["component"].asstr()[:]] == ["xx", "yy", "xy"]
+        elements = file["curvature"].dims[2]["element"][:]
+        np.testing.assert_array_equal(elements, np.arange(file["curvature"].shape[2]))
+        assert file["coefficients"].dims[1].label == "along"
         assert file["force"].attrs["unit"] == "N"
-        assert all(file[name].attrs["description"] for name in file if name != "about")
+        assert all(
+            file[name].attrs["description"] for name in file if name not in ("README", "axes")
+        )
 
 
 def test_settings_that_change_are_told_of_and_each_frame_says_which_it_had(tmp_path) -> None:
@@ -677,7 +704,8 @@ def test_a_full_disk_is_told_of(taps, tmp_path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("suffix", "module", "extra"), [(".h5", "h5py", "hdf5"), (".parquet", "pyarrow", "parquet")]
+    ("suffix", "module", "extra"),
+    [(".h5", "h5py", "hdf5"), (".parquet", "pyarrow", "parquet"), (".rrd", "rerun", "rerun")],
 )
 def test_without_its_package_the_line_that_installs_it_is_told(
     suffix: str, module: str, extra: str, taps, tmp_path, monkeypatch

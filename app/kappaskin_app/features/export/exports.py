@@ -16,7 +16,7 @@ from kappaskin.errors import Refusal
 from kappaskin.pipeline import Setup
 from kappaskin.recording import (
     PRESETS,
-    SURFACES,
+    TABLES,
     Exported,
     ExportRequest,
     ExportTask,
@@ -54,8 +54,9 @@ _FORMATS = {
     ".pvd": "Series of surfaces for ParaView",
     ".stl": "Surface for CAD",
     ".glb": "Surface or its motion in glTF",
+    ".rrd": "All over time, for Rerun",
 }
-_EXTRAS = {_PARQUET: ("pyarrow", "parquet"), ".h5": ("h5py", "hdf5")}
+_EXTRAS = {_PARQUET: ("pyarrow", "parquet"), ".h5": ("h5py", "hdf5"), ".rrd": ("rerun", "rerun")}
 """What some formats need: a module, and the extra that installs it."""
 _EXPLAINED = {
     "recording": "The recording to export; it is not changed.",
@@ -191,7 +192,7 @@ class ExportDialog(WorkDialog):
         one, suffix = self._at_once, Path(self.to.text()).suffix.lower()
         if (at := self.format.findData(suffix)) >= 0:
             self.format.setCurrentIndex(at)
-        self.preset.setEnabled(not busy and suffix not in SURFACES)
+        self.preset.setEnabled(not busy and suffix in TABLES)
         self._changed.stop()
         if self._forecast.running:
             self._forecast.stop()

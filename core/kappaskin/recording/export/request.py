@@ -25,6 +25,9 @@ TABLES = (".parquet", ".csv", ".npz", ".h5")
 SURFACES = (".vtp", ".stl", ".pvd", ".glb")
 """Suffixes of files of the skin's surface."""
 
+VIEWS = (".rrd",)
+"""Suffixes of files of all that a viewer shows over time."""
+
 
 class ExportPreset(NamedTuple):
     """The `columns` of a table, by their names; without any all of them.
@@ -117,11 +120,10 @@ class ExportRequest:
             raise Refusal("expected one moment or a span of time, got both; omit one of them")
 
     def _check_format(self) -> None:
-        if self.format not in TABLES + SURFACES:
-            raise Refusal(
-                f"{self.to}: expected a file that ends in one of {', '.join(TABLES + SURFACES)}"
-            )
-        if self.format in TABLES and self.at is not None:
+        known = TABLES + SURFACES + VIEWS
+        if self.format not in known:
+            raise Refusal(f"{self.to}: expected a file that ends in one of {', '.join(known)}")
+        if self.format not in SURFACES and self.at is not None:
             raise Refusal(
                 f"a {self.format} has a row for each frame: give a span of time instead of a moment"
             )

@@ -31,7 +31,7 @@ class Column(NamedTuple):
     """A number, or an array of some `shape`, of each frame; `labels` name those in it, flattened.
 
     Of a `unit`, which is empty for a plain number, and of the NumPy type `kind`; `text` says what
-    it is, and `value` gets it.
+    it is, and `value` gets it. `axes` are what is along each dimension, and the names there.
     """
 
     name: str
@@ -42,6 +42,7 @@ class Column(NamedTuple):
     text: str
     value: Callable[[ExportedFrame], Any]
     units: tuple[str, ...] = ()
+    axes: tuple[tuple[str, tuple[str, ...]], ...] = ()
 
     def heads(self) -> list[str]:
         """Names of its numbers, each with the unit: its own of `units`, or that of all."""
@@ -91,6 +92,7 @@ def _all_columns(info: RecordingInfo) -> tuple[Column, ...]:
             nominal.labels(lengths),
             "NaN where not scanned",
             counts,
+            axes=tuple(nominal.named_axes(lengths)),
         ),
         *made["fit"],
         *made["contact"],
@@ -110,6 +112,7 @@ def _columns(group: str, lengths: Axes, sensor: Sensor) -> list[Column]:
             text,
             _value(getter),
             quantity.units_of(sensor.layout),
+            tuple(quantity.named_axes(lengths)),
         )
         for quantity in REPORTED
         for suffix, text, getter in quantity.forms
@@ -274,17 +277,33 @@ class _File(io.FileIO):
             raise self._trouble
 
 
+_README = """{program} exported the recording {recording}.
+
+Each data set has a row for each frame, in the order in which the frames came. Its attributes
+unit and description say what it is; no unit is a plain number. The data set time is the scale of
+the first dimension of all of them. Further dimensions have scales in the group axes: names of
+components or the numbers of elements and functions. NaN is what is not known. The attributes of
+the file are texts or JSON: device, skin, positions of the elements in m, settings, calibration and
+tare.
+
+    with h5py.File("{file}") as file:
+        force = file["force"]
+        print(force.attrs["unit"], force.dims[0]["time"][:], force[:])
+
+"""
+
+
 class Hdf5Table(TableWriter):
-    """HDF5: data sets that grow with the rows."""
+    """HDF5: data sets that grow with the rows, with scales for their dimensions."""
 
     def begin(self, scratch: Path) -> None:
         try:
-            h5py: Any = importlib.import_module("h5py")
+            self._h5py: Any = importlib.import_module("h5py")
         except ImportError as error:
             raise lacking("hdf5", "a .h5 file, unlike an .npz,", error) from error
         self._disk = _File(self.path)
         # Attributes of older versions end at 64 KiB.
-        self._file: Any = h5py.File(self._disk, "w", libver=("v108", "v108"))
+        self._file: Any = self._h5py.File(self._disk, "w", libver=("v108", "v108"))
         for name, value in self.info.facts.items():
             self._file.attrs[name] = value if isinstance(value, str) else json.dumps(value)
         for column in self.columns:
@@ -297,6 +316,23 @@ class Hdf5Table(TableWriter):
             )
             made.attrs["unit"], made.attrs["description"] = column.unit, column.text
 
+    def _scale(self) -> None:
+        """Let `time` be the scale of rows, and names or numbers those of further dimensions."""
+        self._file["time"].make_scale("time")
+        for column in self.columns:
+            made = self._file[column.name]
+            if column.name != "time":
+                made.dims[0].attach_scale(self._file["time"])
+            for n, (label, names) in enumerate(column.axes, 1):
+                numbers = all(name.isdecimal() for name in names)
+                which = "_".join(names) if label == "component" else f"{label}_{len(names)}"
+                path = f"axes/{which}"
+                if path not in self._file:
+                    made_of = np.arange(len(names)) if numbers else np.array(names, "S")
+                    self._file.create_dataset(path, data=made_of).make_scale(label)
+                made.dims[n].label = label
+                made.dims[n].attach_scale(self._file[path])
+
     def write(self, block: Block) -> None:
         for name, values in block.items():
             data = self._file[name]
@@ -305,8 +341,21 @@ class Hdf5Table(TableWriter):
         self._disk.check()
 
     def end(self) -> None:
+        self._file.flush()
+        self._disk.check()
+        try:
+            self._describe()
+        except OSError:
+            self._disk.check()  # has the reason
+            raise
         self._file.close()
         self._disk.check()
+
+    def _describe(self) -> None:
+        self._scale()
+        lines = [f"{c.name} [{c.unit}]: {c.text}" for c in self.columns]
+        said = _README.format(file=self.path.name, **self.info.facts) + "\n".join(lines) + "\n"
+        self._file.create_dataset("README", data=said, dtype=self._h5py.string_dtype())
 
     def close(self) -> None:
         self._file.close()

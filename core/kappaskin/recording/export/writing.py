@@ -20,6 +20,7 @@ from kappaskin.recording.export.request import (
     another,
     recording_info,
 )
+from kappaskin.recording.export.rerun_stream import RrdFile
 from kappaskin.recording.export.surfaces import GlbSurfaces, StlSurfaces, VtpSurfaces
 from kappaskin.recording.export.tables import CsvTable, Hdf5Table, NpzTable, ParquetTable
 from kappaskin.recording.reading import RecordedMessage, Recording
@@ -36,6 +37,7 @@ FORMATS: dict[str, type[ExportWriter]] = {
     ".pvd": VtpSurfaces,
     ".stl": StlSurfaces,
     ".glb": GlbSurfaces,
+    ".rrd": RrdFile,
 }
 """Writers by suffix: a new format is one more class."""
 

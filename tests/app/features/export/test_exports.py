@@ -300,6 +300,7 @@ def test_a_format_that_is_not_installed_says_what_installs_it(qapp, qtbot, monke
     assert off == [
         "Table in Parquet (.parquet): pip install 'kappaskin[parquet]'",
         "Table in HDF5 (.h5): pip install 'kappaskin[hdf5]'",
+        "All over time, for Rerun (.rrd): pip install 'kappaskin[rerun]'",
     ]
     assert dialog.format.currentData() == ".csv"
 
@@ -373,7 +374,7 @@ def test_a_name_without_an_ending_gets_that_of_the_format_chosen(
         named(tmp_path / "force 0.5 N", kind)
         dialog.choose_file.click()
         names.append(Path(dialog.to.text()).name)
-    endings = [".csv", ".parquet", ".npz", ".h5", ".vtp", ".pvd", ".stl", ".glb"]
+    endings = [".csv", ".parquet", ".npz", ".h5", ".vtp", ".pvd", ".stl", ".glb", ".rrd"]
     assert names == [f"force 0.5 N{ending}" for ending in endings]
     named(tmp_path / "out.npz", "CSV (*.csv)")
     dialog.choose_file.click()
