@@ -230,10 +230,7 @@ def bundle(arguments: list[str], shown: dict[str, str]) -> int:
 
 def docs(arguments: list[str], shown: dict[str, str]) -> int:
     """Make the site: guide, lessons, notebooks and reference, with their links checked."""
-    import tomllib
-
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
-    install(VENV, str(ROOT), *project["dependency-groups"]["docs"], keep=True)
+    install(VENV, str(ROOT), *group("docs"), keep=True)
     return run([tool("python"), str(ROOT / "packaging/docs/build.py"), *arguments], shown)
 
 
