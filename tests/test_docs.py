@@ -51,3 +51,14 @@ def test_the_site_is_built_without_a_warning(capfd):
 
     assert (SITE["OUT"] / "searchindex.js").exists()
     assert "dist/docs/index.html" in capfd.readouterr().out
+
+
+def test_a_lesson_has_its_title_and_questions_without_settings_and_answers(tmp_path):
+    SITE["write_pages"](tmp_path / "source")
+
+    lesson = (tmp_path / "source" / "lessons" / "01-curvature-gage.md").read_text("utf-8")
+    assert lesson.startswith("# What a curvature gage measures\n")
+    assert "+++" not in lesson
+    assert "**Where is the upper map, for bending along x, darkest?**\n\n- Along the edge" in lesson
+    assert "```toml" not in lesson
+    assert "right = " not in lesson

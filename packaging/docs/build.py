@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import tomllib
 from pathlib import Path
 
 HERE = Path(__file__).parent
@@ -61,9 +62,25 @@ def names_of(module: str) -> list[str]:
     ]
 
 
+def lesson_page(lesson: str) -> str:
+    """A lesson to read: its title, texts and questions, without settings and answers."""
+    _, head, text = lesson.split("+++\n", 2)
+    about = tomllib.loads(head)
+
+    def asked(block: re.Match[str]) -> str:
+        step = tomllib.loads(block[1])
+        choices = "".join(f"- {choice}\n" for choice in step.get("choices", ()))
+        return f"**{step['question']}**\n\n{choices}" if "question" in step else ""
+
+    text = re.sub(r"^```toml\n(.*?)^```\n", asked, text, flags=re.M | re.S)
+    return f"# {about['title']}\n\n{about['learn']}\n{text}"
+
+
 def write_pages(source: Path) -> None:
     """Write all pages into the folder `source`, which has no file yet."""
     shutil.copytree(PAGES, source, ignore=shutil.ignore_patterns("*.py", "__pycache__", "measured"))
+    for lesson in (source / "lessons").glob("[0-9]*.md"):
+        lesson.write_text(lesson_page(lesson.read_text("utf-8")), "utf-8")
     reference = source / "reference"
     reference.mkdir()
     for room in ROOMS:
@@ -73,10 +90,12 @@ def write_pages(source: Path) -> None:
     def names(folder: str, kind: str) -> list[str]:
         return sorted(f"{folder}/{file.name}" for file in (source / folder).glob(kind))
 
+    contents = (source / "guide" / "README.md").read_text("utf-8")
+    guide = [f"guide/{page}" for page in re.findall(r"^\d+\. \[.+?\]\((.+?)\)", contents, re.M)]
     more = {file.relative_to(source).as_posix() for file in source.rglob("*.md")}
     more -= {*names("guide", "*.md"), *names("lessons", "*.md"), *names("reference", "*.md")}
     trees = (
-        tree("Guide", names("guide", "*.md")),
+        tree("Guide", ["guide/README.md", *guide]),
         tree("Lessons", names("lessons", "*.md")),
         tree("Notebooks", names("notebooks", "*.ipynb")),
         tree("Reference", [f"reference/{room}.md" for room in ROOMS]),

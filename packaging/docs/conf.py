@@ -3,20 +3,23 @@
 import re
 from pathlib import Path
 
+from numpy.typing import ArrayLike, DTypeLike
+from sphinx.util.typing import stringify_annotation
+
+from kappaskin.frames import Array, Indices, Mask
+
 project = "Kappaskin"
 extensions = ["myst_nb", "sphinx.ext.autodoc"]
 html_theme = "furo"
 html_title = project
-html_logo = str(Path(__file__).parents[2] / "resources/kappaskin_resources/icons/kappaskin.svg")
+html_favicon = str(Path(__file__).parents[2] / "resources/kappaskin_resources/icons/kappaskin.svg")
 html_show_copyright = html_show_sphinx = html_copy_source = False
-html_theme_options = {"sidebar_hide_name": True}
-templates_path: list[str] = []
 myst_heading_anchors = 6
 myst_enable_extensions = ["colon_fence"]
 nb_execution_mode = "force"
 nb_execution_raise_on_error = True
 nb_execution_timeout = 300
-autodoc_typehints = "signature"
+autodoc_preserve_defaults = True
 autodoc_member_order = "groupwise"
 autodoc_inherit_docstrings = False
 suppress_warnings = ["myst.header", "misc.highlighting_failure", "ref.python"]
@@ -37,5 +40,26 @@ def as_plain_text(app, what, name, obj, options, lines):
             lines[n:n] = [""]
 
 
+_ALIASES = {
+    stringify_annotation(of, "smart"): name
+    for name, of in (
+        ("ArrayLike", ArrayLike),
+        ("DTypeLike", DTypeLike),
+        ("Array", Array),
+        ("Mask", Mask),
+        ("Indices", Indices),
+    )
+}
+
+
+def with_aliases(app, what, name, obj, options, signature, returned):
+    """A signature in which types of arrays have their short names."""
+    texts = [signature, returned]
+    for whole, short in _ALIASES.items():
+        texts = [text and text.replace(whole, short) for text in texts]
+    return tuple(texts)
+
+
 def setup(app):
+    app.connect("autodoc-process-signature", with_aliases)
     app.connect("autodoc-process-docstring", as_plain_text)
