@@ -150,12 +150,11 @@ def test(arguments: list[str], shown: dict[str, str]) -> int:
 def run_tests(arguments: list[str], shown: dict[str, str]) -> int:
     """Run the tests, and once more, one at a time, the few that fail beside others."""
     with tempfile.TemporaryDirectory() as folder:
-        remembered = ["-p", "cacheprovider", "-o", f"cache_dir={folder}"]
-        command = [tool(TESTS[0]), *TESTS[1:], *arguments, *remembered]
+        command = [tool(TESTS[0]), *TESTS[1:], *arguments, "-o", f"cache_dir={folder}"]
         tested = run(command, shown, cwd=ROOT)
         failed = Path(folder, "v", "cache", "lastfailed")
         names = list(json.loads(failed.read_text())) if failed.exists() else []
-        if tested != 1 or len(names) > RETRIED:
+        if tested != 1 or not 0 < len(names) <= RETRIED:
             return tested
         say(f"Once more, one at a time: {shlex.join(names)}")
         tested = run([*command, "-n1", "--last-failed"], shown, cwd=ROOT)

@@ -289,7 +289,7 @@ def test_what_fails_beside_others_is_told_and_tried_alone(
     )
     monkeypatch.setitem(start["run_tests"].__globals__, "TESTS", ("pytest", "-n0"))
 
-    arguments = ["-c", "/dev/null", f"--rootdir={tmp_path}", str(file)]
+    arguments = ["-c", str(ROOT / "pyproject.toml"), f"--rootdir={tmp_path}", str(file)]
     assert start["run_tests"](arguments, start["environment"]()) == code
 
     assert (tmp_path / "rounds").read_text() == "." * rounds
