@@ -29,6 +29,7 @@ from kappaskin.publish.access import AccessCheck
 from kappaskin.publish.foxglove_channels import (
     CHANNELS,
     CONTACT,
+    FRAMES,
     LOG,
     MESH,
     POSE,
@@ -37,6 +38,7 @@ from kappaskin.publish.foxglove_channels import (
     STATUS,
     Channel,
     SkinMessages,
+    frames,
     logged,
     pose,
 )
@@ -366,8 +368,9 @@ class Foxglove:
             subscribed = client.subscribed
             if CONTACT in subscribed:
                 client.offer(CONTACT, message.timestamp, message.contact)
-            if POSE in subscribed and message.estimate.contact.present:
-                client.offer(POSE, message.timestamp, pose(message))
+            for channel, made in ((POSE, pose), (FRAMES, frames)):
+                if channel in subscribed and message.estimate.contact.present:
+                    client.offer(channel, message.timestamp, made(message))
             if SHAPE in subscribed and message.mark.with_shape:
                 client.offer(SHAPE, message.timestamp, message.shape)
 

@@ -21,6 +21,9 @@ from kappaskin.skin import RestMesh
 FRAME = "skin"
 """The frame of reference: that of `Patch`, x along the skin, z outward at its middle."""
 
+CONTACT_FRAME = "contact"
+"""The frame of the contact: z is the skin's normal, x along the skin."""
+
 _WARNING, _INFORMATION = 3, 2
 _GRAVE = ("gap", "gone", "refused", "engine", "other", "restarted", "noise")
 
@@ -65,6 +68,11 @@ _TIME = _object(sec=_INTEGER, nsec=_INTEGER) | {"title": "time"}
 _POSE = _object(position=_numbers("x", "y", "z"), orientation=_numbers("x", "y", "z", "w"))
 _FIELD = _object(name=_TEXT, offset=_INTEGER, type=_INTEGER)
 _IN_FRAME: Schema = {"timestamp": _TIME, "frame_id": _TEXT, "pose": _POSE}
+_TRANSFORM = _object(
+    **{"timestamp": _TIME, "parent_frame_id": _TEXT, "child_frame_id": _TEXT},
+    translation=_numbers("x", "y", "z"),
+    rotation=_numbers("x", "y", "z", "w"),
+)
 _KIND: Schema = {"kind": _TEXT, "version": _INTEGER}
 
 
@@ -113,8 +121,12 @@ LOG = _channel(6, "/log", "foxglove.Log", _LOG)
 MESH = Channel(
     *(7, "/skin/mesh", SCENE_UPDATE.name, SCENE_UPDATE.definition.decode()), "cdr", "ros2msg"
 )
+FRAMES = _channel(
+    *(8, "/tf", "foxglove.FrameTransforms"),
+    _object(transforms={"type": "array", "items": _TRANSFORM}),
+)
 
-CHANNELS = (CONTACT, POSE, SHAPE, SKIN, STATUS, LOG, MESH)
+CHANNELS = (CONTACT, POSE, SHAPE, SKIN, STATUS, LOG, MESH, FRAMES)
 
 
 def moment(seconds: float) -> str:
@@ -292,16 +304,25 @@ class SkinMessages:
 
 def pose(message: EstimateMessage) -> bytes:
     """The contact as a foxglove.PoseInFrame in JSON: z is the skin's normal, x along the skin."""
-    geometry = message.estimate.geometry
-    x, y, z = geometry.position.tolist()
-    turn = dict(
-        zip(
-            "xyzw",
-            scipy.spatial.transform.Rotation.from_matrix(geometry.frame.T).as_quat().tolist(),
-            strict=True,
-        )
-    )
+    place, turn = _placed(message)
     return (
-        f'{{"timestamp":{moment(message.timestamp)},"frame_id":"{FRAME}","pose":{{"position":'
-        f'{{"x":{x},"y":{y},"z":{z}}},"orientation":{json.dumps(turn)}}}}}'
+        f'{{"timestamp":{moment(message.timestamp)},"frame_id":"{FRAME}",'
+        f'"pose":{{"position":{place},"orientation":{turn}}}}}'
     ).encode()
+
+
+def frames(message: EstimateMessage) -> bytes:
+    """The frame `CONTACT_FRAME` in that of the skin as foxglove.FrameTransforms in JSON."""
+    place, turn = _placed(message)
+    return (
+        f'{{"transforms":[{{"timestamp":{moment(message.timestamp)},"parent_frame_id":"{FRAME}",'
+        f'"child_frame_id":"{CONTACT_FRAME}","translation":{place},"rotation":{turn}}}]}}'
+    ).encode()
+
+
+def _placed(message: EstimateMessage) -> tuple[str, str]:
+    """Position and orientation of the contact in JSON."""
+    geometry = message.estimate.geometry
+    turn = scipy.spatial.transform.Rotation.from_matrix(geometry.frame.T).as_quat().tolist()
+    place = dict(zip("xyz", geometry.position.tolist(), strict=True))
+    return json.dumps(place), json.dumps(dict(zip("xyzw", turn, strict=True)))

@@ -2,6 +2,7 @@
 
 import base64
 import json
+import re
 import socket
 import struct
 import subprocess
@@ -12,8 +13,10 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, closing, suppress
 from copy import copy
 from dataclasses import replace
+from importlib.resources import files
 from types import SimpleNamespace
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -44,6 +47,7 @@ pytestmark = pytest.mark.slow
 PRESSED = load_scene("off-centre")
 EVENT = Event(0.0, "gap", "3 messages lost")
 STATE = SourceState("streaming", "sim", "", PRESSED.sensor(), 500.0, 0.0, (EVENT,))
+PUBLISHING = files("kappaskin_resources") / "publishing"
 TOPICS = {channel.topic: channel.number for channel in CHANNELS}
 
 HELLO = (
@@ -381,6 +385,36 @@ def test_the_pose_stands_on_the_skin_along_its_normal(client, server, message) -
     assert list(position.values()) == pytest.approx(list(geometry.position))
     up = [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)]
     assert up == pytest.approx(list(geometry.normal), abs=1e-9)
+
+
+def test_the_frame_of_the_contact_is_where_its_pose_is(client, server, message) -> None:
+    one = client("/contact/pose", "/tf")
+    server.send(message)
+    told = {number: words for number, _, words in (parsed(one.recv(PATIENCE)) for _ in range(2))}
+    pose, (frame,) = told[70 + TOPICS["/contact/pose"]], told[70 + TOPICS["/tf"]]["transforms"]
+    assert (frame["parent_frame_id"], frame["child_frame_id"]) == (pose["frame_id"], "contact")
+    assert frame["translation"] == pose["pose"]["position"]
+    assert frame["rotation"] == pose["pose"]["orientation"]
+    assert frame["timestamp"] == pose["timestamp"]
+
+
+def test_layouts_for_viewers_name_what_is_sent(message) -> None:
+    sent = json.loads(message.contact)
+    layout = json.loads((PUBLISHING / "foxglove-layout.json").read_text())
+    panels = layout["configById"]
+    places = re.findall(r"[\w]+![\w]+", json.dumps(layout["layout"]))
+    assert sorted(places) == sorted(panels)
+    topics = [*panels["3D!skin"]["topics"], panels["RosOut!log"]["topicToRender"]]
+    assert set(topics) <= set(TOPICS)
+    plotted = [path["value"] for panel in panels.values() for path in panel.get("paths", [])]
+    assert len(plotted) == 6
+    tree = ElementTree.fromstring((PUBLISHING / "plotjuggler-layout.xml").read_text())
+    curves = [f"/contact.{each.attrib['name'][1:]}" for each in tree.iter("curve")]
+    assert len(curves) == 10
+    for name in plotted + curves:
+        topic, _, key = name.partition(".")
+        assert topic in TOPICS
+        assert isinstance(sent[key], float), name
 
 
 def test_who_unsubscribes_gets_no_more(client, server, message) -> None:
