@@ -489,10 +489,10 @@ def _array(values: Any) -> Array:
 
 
 def load_calibration(
-    path: Path, sensor: Sensor, now: datetime, oldest: timedelta = OLDEST
+    path: Path | str, sensor: Sensor, now: datetime, oldest: timedelta = OLDEST
 ) -> Calibration:
     """The calibration in `path`, if it is of this `sensor` and at `now` no older than `oldest`."""
-    calibration = Calibration.read(path)
+    calibration = Calibration.read(Path(path))
     try:
         calibration.check(sensor)
     except Refusal as refusal:

@@ -231,7 +231,8 @@ class Recording(Displayed):
     Times are the same for all fingers.
     """
 
-    def __init__(self, path: Path, finger: str | None = None) -> None:
+    def __init__(self, path: Path | str, finger: str | None = None) -> None:
+        path = Path(path)
         if "#" in path.name and not path.exists():
             name, _, named = path.name.rpartition("#")
             path, finger = path.with_name(name), named if finger is None else finger

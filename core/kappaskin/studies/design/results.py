@@ -281,8 +281,8 @@ class StudyFolder(Displayed):
     result, whatever else has changed in the study meanwhile.
     """
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
+    def __init__(self, path: Path | str) -> None:
+        self.path = Path(path)
 
     @classmethod
     def opened(cls, path: Path, study: Study) -> "StudyFolder":

@@ -158,17 +158,21 @@ def _draw_strip(x: Array | None, w: Array, figure: style.Figure) -> None:
 
 
 def _draw_force(recording: Recording, figure: style.Figure) -> None:
-    """The force of the contact over time; its displacement where no force is known."""
+    """The force of the contact, or its displacement if that is not known, over time."""
     finger = f"#{recording.finger}" * bool(recording.finger)
     path = recording.path.with_name(recording.path.name + finger)
     parts = [(at, found) for _, at, found in contacts_in(path) if len(at)]
     at = np.concatenate([each for each, _ in parts])
-    force = np.concatenate([found["force"] for _, found in parts])
-    depth = 1e3 * np.concatenate([found["displacement"] for _, found in parts])
+    force, force_sd, depth, depth_sd = (
+        np.concatenate([found[name] for _, found in parts])
+        for name in ("force", "force_sd", "displacement", "displacement_sd")
+    )
     known = bool(np.isfinite(force).any())
+    value, sd = (force, force_sd) if known else (1e3 * depth, 1e3 * depth_sd)
     axes = _axes(figure, 90, 50)
-    axes.plot(at, force if known else depth, ".", color=style.BLUE, ms=2)
-    axes.set(xlabel="time [s]", ylabel="force [N]" if known else "displacement w [mm]")
+    half = np.where(np.isfinite(sd), _NORMAL_95 * sd, 0.0)
+    axes.errorbar(at, value, half, fmt=".", color=style.BLUE, ecolor=style.GREY, ms=2, lw=0.5)
+    axes.set(xlabel="time [s]", ylabel=f"{'force [N]' if known else 'displacement w [mm]'} (95 %)")
 
 
 def html_of(value: object) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from kappaskin import LeastSquares, Patch, Recording, Refusal, SensorLayout, SineBasis, stream
+from kappaskin.recording import contacts_in
 from kappaskin.studies import load_study
 
 pytestmark = pytest.mark.slow
@@ -70,8 +71,10 @@ def test_of_several_frames_a_fit_shows_how_many(fit):
 def test_an_estimate_shows_the_numbers_of_the_window(estimate):
     found = cells(estimate)
 
-    assert found["Force"].startswith(f"{estimate.contact.force:.2f}")
-    assert "N (95 %)" in found["Force"]
+    value, half = re.fullmatch(r"(\S+) ± (\S+) N \(95 %\)", found["Force"]).groups()
+    contact = estimate.contact
+    assert float(value) == pytest.approx(contact.force, abs=0.06 * float(half))
+    assert float(half) == pytest.approx(1.96 * contact.force_sd, rel=0.06)
 
 
 def test_an_estimate_without_a_surface_has_a_table_and_nothing_to_draw(estimate):
@@ -83,11 +86,15 @@ def test_an_estimate_without_a_surface_has_a_table_and_nothing_to_draw(estimate)
 
 
 def test_a_recording_draws_the_force_of_every_contact(recording):
-    with Recording(recording) as opened:
-        drawn = opened.plot().get_lines()[0].get_xydata()
-        found = cells(opened)
+    with Recording(str(recording)) as opened:
+        axes, found = opened.plot(), cells(opened)
+        (_, _, of) = next(iter(contacts_in(recording)))
 
+    drawn, (bars,) = axes.get_lines()[0].get_xydata(), axes.collections
     assert len(drawn) == opened.counts["/kappaskin/contact"]
+    low, high = bars.get_segments()[0][:, 1]
+    assert (high - low) / 2 == pytest.approx(1.96 * of["force_sd"][0], rel=1e-6)
+    assert (high + low) / 2 == pytest.approx(of["force"][0])
     assert found["length"] == f"{opened.seconds(opened.last):.1f} s"
 
 
