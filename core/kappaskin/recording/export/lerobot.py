@@ -127,13 +127,12 @@ class LeRobotFolder(TableWriter):
             "video_path": None,
             "features": self._features,
         }
-        texts = {column.name: column.text for column in self.columns}
         for name, content in {
             "info.json": info,
             "tasks.jsonl": {"task_index": 0, "task": task},
             "episodes.jsonl": episode,
             "episodes_stats.jsonl": {"episode_index": 0, "stats": statistics},
-            "kappaskin.json": self.info.facts | {"columns": texts, "resampled": _RESAMPLED},
+            "kappaskin.json": self.info.facts | {"resampled": _RESAMPLED},
         }.items():
             (self.path / "meta" / name).write_text(f"{json.dumps(content)}\n", encoding="utf-8")
 
