@@ -137,6 +137,7 @@ _WRITERS = {
     "kappaskin.recording.repair": "the same",
     "kappaskin.recording.export.surfaces": "in a scratch folder, which export.writing empties",
     "kappaskin.recording.export.tables": "the same",
+    "kappaskin.recording.export.lerobot": "the same",
     "kappaskin_app.features.export.filming": "FFmpeg writes the film, which is named once whole",
     "kappaskin_app.shell.log_files": "a log grows",
 }

@@ -49,6 +49,7 @@ from kappaskin.recording import (
     Verification,
 )
 from kappaskin.recording.cdr import decode
+from kappaskin.recording.export.lerobot import LeRobotFolder, _rate
 from kappaskin.recording.export.surfaces import SkinMesh, SkinSurface
 from kappaskin.recording.export.writing import export_steps
 from kappaskin.recording.messages import CONTACTS, SECOND_CONTACT, SECONDS, TOPICS
@@ -593,6 +594,14 @@ def test_a_file_that_appears_meanwhile_stays_as_it_is(taps, tmp_path) -> None:
         ("out", {}, r"ends in one of \.parquet, \.csv"),
         ("out.csv", {"preset": "all"}, "one of contact, readings, everything; got 'all'"),
         ("out.csv", {"at": 0.1}, "a row for each frame"),
+        ("out.lerobot", {"at": 0.1}, "a row for each frame"),
+        (
+            "out.lerobot",
+            {"every": 0.03},
+            r"a whole number of rows a second, .* got one every 0.03 s",
+        ),
+        ("out.lerobot", {"every": 3.0}, "a whole number of rows a second"),
+        ("out.lerobot", {"every": 1e-320}, "a whole number of rows a second"),
         ("out.vtp", {}, "give it"),
         ("out.vtp", {"every": 0.1}, "to a .pvd"),
         ("out.pvd", {}, "between two surfaces"),
@@ -690,7 +699,8 @@ def test_a_full_disk_is_told_of(taps, tmp_path) -> None:
         "    try: list(export_steps(ExportRequest(recording, to, at=at), to.parent))\n"
         "    except Refusal as refusal: print(refusal)\n"
     )
-    suffixes = (".csv", ".npz", ".h5", ".vtp", ".stl") + (".parquet",) * bool(find_spec("pyarrow"))
+    suffixes = (".csv", ".npz", ".h5", ".vtp", ".stl")
+    suffixes += (".parquet", ".lerobot") * bool(find_spec("pyarrow"))
     places = [tmp_path / f"out{suffix}" for suffix in suffixes]
     command = [sys.executable, "-c", script, *map(str, [taps[0], *places])]
     # What coverage measures would find no room either.
@@ -705,7 +715,12 @@ def test_a_full_disk_is_told_of(taps, tmp_path) -> None:
 
 @pytest.mark.parametrize(
     ("suffix", "module", "extra"),
-    [(".h5", "h5py", "hdf5"), (".parquet", "pyarrow", "parquet"), (".rrd", "rerun", "rerun")],
+    [
+        (".h5", "h5py", "hdf5"),
+        (".parquet", "pyarrow", "parquet"),
+        (".lerobot", "pyarrow", "parquet"),
+        (".rrd", "rerun", "rerun"),
+    ],
 )
 def test_without_its_package_the_line_that_installs_it_is_told(
     suffix: str, module: str, extra: str, taps, tmp_path, monkeypatch
@@ -761,6 +776,111 @@ def test_parquet_has_the_columns_numbers_and_metadata_of_a_csv(preset: str, taps
     said = {name.decode(): value.decode() for name, value in table.schema.metadata.items()}
     assert json.loads(said["device"]) == about_in(tmp_path / "a.csv")["device"]
     assert json.loads(said["columns"])["time"] == "arrival time since the recording began"
+
+
+STATE = {
+    "present": [""],
+    "position": ["m", "m"],
+    "position_sd": ["m", "m"],
+    "force": ["N"],
+    "force_sd": ["N"],
+    "displacement": ["m"],
+    "displacement_sd": ["m"],
+}
+"""Numbers of a contact in a data set, with the units of each."""
+
+
+def read_lerobot(folder: Path) -> tuple[dict[str, np.ndarray], dict, dict]:
+    """Columns of the episode, `info.json` and statistics, checked against each other."""
+    parquet, arrow = pytest.importorskip("pyarrow.parquet"), pytest.importorskip("pyarrow")
+    meta = {path.name: path.read_text() for path in (folder / "meta").iterdir()}
+    info, task, episode, statistics = (
+        json.loads(meta[name], parse_constant=pytest.fail)  # NaN is no JSON
+        for name in ("info.json", "tasks.jsonl", "episodes.jsonl", "episodes_stats.jsonl")
+    )
+    assert info["codebase_version"] == "v2.1"
+    files = [folder / info["data_path"].format(episode_chunk=0, episode_index=0)]
+    assert list(folder.rglob("*.parquet")) == files
+    table = parquet.read_table(files[0])
+    assert table.column_names == [*info["features"]] == [*statistics["stats"]]
+    found = {}
+    for name, feature in info["features"].items():
+        (count,) = feature["shape"]
+        kind = arrow.from_numpy_dtype(np.dtype(feature["dtype"]))
+        assert table.schema.field(name).type == (kind if count == 1 else arrow.list_(kind, count))
+        assert feature["names"] is None or len(feature["names"]) == count
+        found[name] = each = np.array(table[name].to_pylist()).reshape(-1, count)
+        said = statistics["stats"][name]
+        for what in ("min", "max", "mean", "std"):
+            of = getattr(each.astype(float), what)(axis=0)
+            np.testing.assert_allclose(said[what], of, rtol=1e-9, atol=1e-12)
+        assert said["count"] == [table.num_rows]
+    rows = np.arange(info["total_frames"])[:, None]
+    assert episode == {"episode_index": 0, "tasks": [task["task"]], "length": table.num_rows}
+    assert (info["total_episodes"], info["total_tasks"], task["task_index"]) == (1, 1, 0)
+    for name in ("frame_index", "index"):
+        np.testing.assert_array_equal(found[name], rows)
+    assert not found["episode_index"].any()
+    assert not found["task_index"].any()
+    np.testing.assert_allclose(found["timestamp"], rows / info["fps"], rtol=1e-6)
+    return found, info, statistics["stats"]
+
+
+@pytest.mark.parametrize(
+    ("every", "begin", "fps"), [(0.0, 0.0, 100), (0.04, 0.013, 25), (0.004, 0.0, 250)]
+)
+def test_a_lerobot_row_has_the_newest_estimate_by_then(every, begin, fps, taps, tmp_path) -> None:
+    recording, told = taps
+    done = export(recording, tmp_path / "out.lerobot", every=every, begin=begin)
+    found, info, _ = read_lerobot(tmp_path / "out.lerobot")
+    came = np.array([one.frame.host_time - 1000.0 for one in told])
+    taken = [one for one, at in zip(told, came, strict=True) if at >= begin - 1e-9]
+    came = came[-len(taken) :]
+    assert (info["fps"], done.written) == (fps, len(taken))
+    assert info["total_frames"] == math.floor((came[-1] - came[0]) * fps + 1e-3) + 1
+    rows = came[0] + np.arange(info["total_frames"]) / fps
+    newest = [int(np.flatnonzero(came <= at + 1e-8)[-1]) for at in rows]
+    np.testing.assert_allclose(found["recorded_time"][:, 0], came[newest], atol=1e-6)
+    want = [
+        np.hstack([np.ravel(getattr(taken[n].estimate.contact, name)) for name in STATE])
+        for n in newest
+    ]
+    known = np.isfinite(want)
+    assert known.all(axis=1).any()
+    assert not known.all()  # of no contact there is no place
+    np.testing.assert_array_equal(found["known.state"], known)
+    state = np.where(known, want, 0).astype("<f4")
+    np.testing.assert_array_equal(found["observation.state"], state)
+    features = info["features"]
+    assert features["observation.state"]["units"] == [u for units in STATE.values() for u in units]
+    assert features["observation.state"]["names"][:3] == ["present", "position_x", "position_y"]
+    readings = np.array([taken[n].estimate.curvature.ravel() for n in newest]).astype("<f4")
+    np.testing.assert_array_equal(found["observation.readings"], readings)
+    assert found["known.readings"].all()
+    assert features["observation.readings"]["names"][1] == "curvature_xx_1"
+    assert set(features["observation.readings"]["units"]) == {"1/m"}
+    about = json.loads((tmp_path / "out.lerobot" / "meta" / "kappaskin.json").read_text())
+    assert about["recording"] == "taps.mcap"
+    assert "newest frame" in about["resampled"]
+    with pytest.raises(Refusal, match="already exists"):
+        ExportRequest(recording, tmp_path / "out.lerobot")
+
+
+def test_a_lerobot_data_set_is_the_same_in_any_blocks(taps, tmp_path, monkeypatch) -> None:
+    for folder, size in (("a", LeRobotFolder.block), ("b", 1), ("c", 2**14)):
+        monkeypatch.setattr(LeRobotFolder, "block", size)
+        export(taps[0], tmp_path / folder / "out.lerobot", every=0.004)
+    a, b, c = (read_lerobot(tmp_path / folder / "out.lerobot")[0] for folder in "abc")
+    for name, values in a.items():
+        np.testing.assert_array_equal(values, b[name])
+        np.testing.assert_array_equal(values, c[name])
+
+
+def test_frames_that_come_in_bursts_have_their_median_rate() -> None:
+    at = np.arange(2000) // 10 * 0.01  # ten at once
+    assert _rate(at) == 1000
+    assert _rate(np.concatenate([at, at + 60.0])) == 1000  # a minute's pause
+    assert _rate(at[:1]) == _rate(at[:2]) == 1
 
 
 def test_readings_are_counts_and_corrected_readings(taps, tmp_path) -> None:

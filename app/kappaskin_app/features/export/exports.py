@@ -55,8 +55,14 @@ _FORMATS = {
     ".stl": "Surface for CAD",
     ".glb": "Surface or its motion in glTF",
     ".rrd": "All over time, for Rerun",
+    ".lerobot": "Data set for LeRobot",
 }
-_EXTRAS = {_PARQUET: ("pyarrow", "parquet"), ".h5": ("h5py", "hdf5"), ".rrd": ("rerun", "rerun")}
+_EXTRAS = {
+    _PARQUET: ("pyarrow", "parquet"),
+    ".h5": ("h5py", "hdf5"),
+    ".rrd": ("rerun", "rerun"),
+    ".lerobot": ("pyarrow", "parquet"),
+}
 """What some formats need: a module, and the extra that installs it."""
 _EXPLAINED = {
     "recording": "The recording to export; it is not changed.",

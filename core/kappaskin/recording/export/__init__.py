@@ -1,4 +1,4 @@
-"""Export of recordings: tables of frames, and meshes of the skin."""
+"""Export of recordings: tables of frames, data sets, and meshes of the skin."""
 
 from kappaskin.recording.export.request import PRESETS as PRESETS
 from kappaskin.recording.export.request import ExportRequest as ExportRequest

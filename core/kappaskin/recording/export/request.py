@@ -28,6 +28,9 @@ SURFACES = (".vtp", ".stl", ".pvd", ".glb")
 VIEWS = (".rrd",)
 """Suffixes of files of all that a viewer shows over time."""
 
+DATA_SETS = (".lerobot",)
+"""Suffixes of folders with a row at regular times."""
+
 
 class ExportPreset(NamedTuple):
     """The `columns` of a table, by their names; without any all of them.
@@ -60,9 +63,10 @@ class ExportRequest:
     """The file `to` of a `recording`, in the format that its suffix names.
 
     Times are in s since the recording began: from `begin` until `end`, one frame each `every` s, or
-    all where that is 0; or the first frame from `at` on alone. Frames are worked out with the
-    settings that were recorded, or with `setup`. A table has the columns of the `preset`, one of
-    `PRESETS`. It is of one `finger` of a hand. A `Refusal` where that makes no file.
+    all where that is 0; or the first frame from `at` on alone. Rows of a data set are `every` s
+    apart, or at the frames' median rate. Frames are worked out with the settings that were
+    recorded, or with `setup`. A table has the columns of the `preset`, one of `PRESETS`. It is of
+    one `finger` of a hand. A `Refusal` where that makes no file.
     """
 
     recording: Path
@@ -98,6 +102,11 @@ class ExportRequest:
         return self.to.with_suffix(".json") if self.format == ".stl" else None
 
     @property
+    def thinned(self) -> float:
+        """Least time in s between two frames for the file; a data set picks from all."""
+        return 0.0 if self.format in DATA_SETS else self.every
+
+    @property
     def files(self) -> tuple[Path, ...]:
         """All outputs: files, and the folder of a series."""
         alone = self.format == ".stl" and self.folder is not None
@@ -120,9 +129,16 @@ class ExportRequest:
             raise Refusal("expected one moment or a span of time, got both; omit one of them")
 
     def _check_format(self) -> None:
-        known = TABLES + SURFACES + VIEWS
+        known = TABLES + SURFACES + VIEWS + DATA_SETS
         if self.format not in known:
             raise Refusal(f"{self.to}: expected a file that ends in one of {', '.join(known)}")
+        rate = 1 / (self.every or 1)
+        whole = 0.5 < rate < 1e5 and abs(rate / round(rate) - 1) < 1e-6
+        if self.format in DATA_SETS and not whole:
+            raise Refusal(
+                f"a {self.format} has a whole number of rows a second, below 100,000; got one "
+                f"every {self.every:g} s: give 1 s, or a part of it as 0.1 s or 0.05 s"
+            )
         if self.format not in SURFACES and self.at is not None:
             raise Refusal(
                 f"a {self.format} has a row for each frame: give a span of time instead of a moment"

@@ -59,9 +59,9 @@ class Column(NamedTuple):
         return found.reshape(self.shape)
 
 
-def columns(info: RecordingInfo, preset: str) -> tuple[Column, ...]:
-    """Those of a preset, the frame's before those of its estimate."""
-    found, names = _all_columns(info), PRESETS[preset].columns
+def columns(info: RecordingInfo, names: tuple[str, ...]) -> tuple[Column, ...]:
+    """Those of the `names`, or all; the frame's before those of its estimate."""
+    found = _all_columns(info)
     single = [c._replace(kind="<f4") if c.kind == "<f8" and c.unit != "s" else c for c in found]
     return tuple(c for c in single if c.name in names) if names else found
 
@@ -137,9 +137,12 @@ class TableWriter(ABC):
     block = 2**22
     """Bytes of rows that are written at once, about."""
 
+    names: tuple[str, ...] = ()
+    """The columns, where they are not those of the preset."""
+
     def __init__(self, scratch: Path, request: ExportRequest, info: RecordingInfo) -> None:
-        self.path, self.info = scratch / request.to.name, info
-        self.columns = columns(info, request.preset)
+        self.path, self.info, self.request = scratch / request.to.name, info, request
+        self.columns = columns(info, self.names or PRESETS[request.preset].columns)
         sizes = (np.dtype(c.kind).itemsize * int(np.prod(c.shape)) for c in self.columns)
         self.rows_at_once = max(self.block // sum(sizes), 1)
         self._rows: list[list[NDArray[Any]]] = []

@@ -12,6 +12,7 @@ from kappaskin.errors import Refusal
 from kappaskin.estimation import slope_warning
 from kappaskin.frames import Frame
 from kappaskin.recording.disk import ScratchTask
+from kappaskin.recording.export.lerobot import LeRobotFolder
 from kappaskin.recording.export.request import (
     ExportedFrame,
     ExportRequest,
@@ -38,6 +39,7 @@ FORMATS: dict[str, type[ExportWriter]] = {
     ".stl": StlSurfaces,
     ".glb": GlbSurfaces,
     ".rrd": RrdFile,
+    ".lerobot": LeRobotFolder,
 }
 """Writers by suffix: a new format is one more class."""
 
@@ -176,7 +178,7 @@ class _ExportWork:
             self._written += 1
             if pipeline.fitted is not None:
                 self._slope = max(self._slope, pipeline.fitted.neglected_slope)
-            first, every = self._request.first, self._request.every
+            first, every = self._request.first, self._request.thinned
             if every:
                 passed = math.floor((at - first) / every + _EARLY)
                 self._due = first + every * (passed + 1 - _EARLY)
@@ -222,8 +224,8 @@ class _ExportWork:
         span = min(request.end, recording.seconds(recording.last)) - self._first
         covered = self._last - self._first
         share = span / covered if request.at is None and covered > 0 else 1.0
-        series = request.every and covered > 0
-        frames = 1 + span // request.every if series else self._written * share
+        series = request.thinned and covered > 0
+        frames = 1 + span // request.thinned if series else self._written * share
         size = sum(file.stat().st_size for file in scratch.rglob("*") if file.is_file())
         seconds = self._wrote - self._begun + share * (time.monotonic() - self._wrote)
         whole = self._head + max(size - self._head, 0) * frames / self._written

@@ -301,6 +301,7 @@ def test_a_format_that_is_not_installed_says_what_installs_it(qapp, qtbot, monke
         "Table in Parquet (.parquet): pip install 'kappaskin[parquet]'",
         "Table in HDF5 (.h5): pip install 'kappaskin[hdf5]'",
         "All over time, for Rerun (.rrd): pip install 'kappaskin[rerun]'",
+        "Data set for LeRobot (.lerobot): pip install 'kappaskin[parquet]'",
     ]
     assert dialog.format.currentData() == ".csv"
 
@@ -375,6 +376,7 @@ def test_a_name_without_an_ending_gets_that_of_the_format_chosen(
         dialog.choose_file.click()
         names.append(Path(dialog.to.text()).name)
     endings = [".csv", ".parquet", ".npz", ".h5", ".vtp", ".pvd", ".stl", ".glb", ".rrd"]
+    endings += [".lerobot"]
     assert names == [f"force 0.5 N{ending}" for ending in endings]
     named(tmp_path / "out.npz", "CSV (*.csv)")
     dialog.choose_file.click()
