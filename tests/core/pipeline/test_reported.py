@@ -155,7 +155,7 @@ FLAGS = [
 @pytest.fixture
 def made() -> list:
     sensor = load_scene("centre").sensor()
-    return list(columns(SimpleNamespace(sensor=sensor, functions=(5, 4)), "everything"))  # pyright: ignore
+    return list(columns(SimpleNamespace(sensor=sensor, functions=(5, 4)), ()))  # pyright: ignore
 
 
 def test_columns_are_called_as_they_always_were(made) -> None:
