@@ -366,7 +366,7 @@ def test_a_window_that_falls_silent_makes_room(served: Served, monkeypatch) -> N
     "settings",
     [
         {"recording": Path("../outside.mcap")},
-        {"recording": Path("/tmp/outside.mcap")},
+        {"recording": Path("/outside.mcap")},
         {"recording": Path("..")},
         {"recording": Path(".hidden")},
         {"recording": 3},

@@ -25,7 +25,7 @@ _MOST = 50_000  # contacts of a recording that a table's picture reads
 _NORMAL_95 = 1.96
 
 
-class Shown(NamedTuple):
+class Representation(NamedTuple):
     """What is shown of a value; `draw` is None where there is nothing to draw."""
 
     title: str
@@ -37,12 +37,12 @@ class Shown(NamedTuple):
 
 
 @singledispatch
-def shown(value: object) -> Shown:
+def shown(value: object) -> Representation:
     raise Refusal(f"expected a value that a notebook shows, got a {type(value).__name__}")
 
 
 @shown.register
-def _(fit: Fit) -> Shown:
+def _(fit: Fit) -> Representation:
     estimator, basis = fit.estimator, fit.estimator.basis
     patch, layout = basis.patch, estimator.layout
     x, y = patch.grid(_SIDE, _SIDE)
@@ -71,11 +71,11 @@ def _(fit: Fit) -> Shown:
     draw = partial(_draw_strip, 1e3 * x, w[0]) if patch.strip else partial(
         _draw_surface, w, extent, elements
     )  # fmt: skip
-    return Shown("Fit", rows, draw)
+    return Representation("Fit", rows, draw)
 
 
 @shown.register
-def _(estimate: Estimate) -> Shown:
+def _(estimate: Estimate) -> Representation:
     rows = [["frame", str(estimate.sequence)]]
     for each in readouts(estimate):
         value = each.words or with_error(each.value, each.half_width, each.unit, each.digits)
@@ -84,11 +84,11 @@ def _(estimate: Estimate) -> Shown:
     draw = partial(_draw_surface, w, None, None) if np.isfinite(w).any() else None
     if w.ndim == 2 and 1 in w.shape and draw:
         draw = partial(_draw_strip, None, w.ravel())
-    return Shown("Estimate", rows, draw)
+    return Representation("Estimate", rows, draw)
 
 
 @shown.register
-def _(recording: Recording) -> Shown:
+def _(recording: Recording) -> Representation:
     rows = [
         ["length", f"{recording.seconds(recording.last):.1f} s"],
         ["recorded by", recording.made_by],
@@ -97,11 +97,11 @@ def _(recording: Recording) -> Shown:
     ]
     contacts = recording.counts.get("/kappaskin/contact", 0)
     draw = partial(_draw_force, recording) if contacts else None
-    return Shown(f"Recording: {recording.path.name}", rows, draw, quick=contacts <= _MOST)
+    return Representation(f"Recording: {recording.path.name}", rows, draw, quick=contacts <= _MOST)
 
 
 @shown.register
-def _(study: Study) -> Shown:
+def _(study: Study) -> Representation:
     rows = [["points", str(study.count)], ["measures", ", ".join(study.measures)]]
     for axis in study.axes:
         for place in axis.places:
@@ -109,15 +109,15 @@ def _(study: Study) -> Shown:
             rows.append([f"varied: {study.called(place)}", values])
     rows += [["drawn at random", place] for place, _ in study.base.draws]
     draw = partial(_draw_elements, 1e3 * study.base.scene.layout.positions)
-    return Shown(f"Study: {study.title}", rows, draw)
+    return Representation(f"Study: {study.title}", rows, draw)
 
 
 @shown.register
-def _(folder: StudyFolder) -> Shown:
+def _(folder: StudyFolder) -> Representation:
     study = folder.study()
     known = stored_results(study, folder)
     draw = partial(draw_measure, study, known, study.measures[0]) if study.axes else None
-    return Shown(f"Results: {study.title}", rows_of(study, known), draw, header_of(study))
+    return Representation(f"Results: {study.title}", rows_of(study, known), draw, header_of(study))
 
 
 def _rms(values: Array) -> float:

@@ -53,11 +53,12 @@ def layout_of(window):
 
 def settled(window, qtbot):
     """The layout, once the window has had it for a second."""
-    was, now = None, layout_of(window)
-    while was != now:
+    was = layout_of(window)
+    for _ in range(60):
         qtbot.wait(1000)
-        was, now = now, layout_of(window)
-    return now
+        if was == (was := layout_of(window)):
+            return was
+    raise AssertionError("the layout never stood still for a second")
 
 
 @pytest.mark.full
