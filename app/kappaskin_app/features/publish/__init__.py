@@ -13,7 +13,7 @@ from kappaskin_app.widgets.parts import ELLIPSIS, text_label
 
 _NAMES = (
     *("send_udp", "udp_to", "send_cues", "cues_to"),
-    *("serve_foxglove", "foxglove_at", "allowed_pages"),
+    *("serve_foxglove", "foxglove_at", "allowed_pages", "send_rerun", "rerun_at"),
 )
 _EVERY = 0.5  # s between two updates of the counts
 _TIP = (
@@ -35,8 +35,9 @@ class PublishPanel(Form):
     """Settings of receivers; shows what each gets, and errors."""
 
     purpose = (
-        "Sends the contact with its error bars to other programs, as JSON by UDP or to Foxglove, "
-        "and what is to be felt to haptic devices; example receivers come with the library."
+        "Sends the contact with its error bars to other programs, as JSON by UDP, to Foxglove "
+        "or to Rerun, and what is to be felt to haptic devices; example receivers come with the "
+        "library."
     )
     guide_page = "record"
 
@@ -78,7 +79,7 @@ def _words(target: TargetStatus) -> list[str]:
         return [f"{target.target}: connecting{ELLIPSIS}"]
     serving = target.target.startswith("foxglove")
     name = target.target.removeprefix("udp://").removeprefix("foxglove://")
-    name = name.replace("cue://", "cues to ")
+    name = name.replace("cue://", "cues to ").replace("rerun://", "Rerun at ")
     lines = [f"{name}, {len(target.receivers)} connected" if serving else name]
     for receiver in target.receivers:
         who = f"{receiver.name}: " if serving else ""

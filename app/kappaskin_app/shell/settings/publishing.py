@@ -1,13 +1,14 @@
 """Settings of publishing: targets of the estimates."""
 
 from dataclasses import dataclass
+from itertools import chain, compress
 
 from kappaskin_app.shell.settings.form_fields import Switch, Text, setting
 
 
 @dataclass(frozen=True)
 class PublishSettings:
-    """UDP, haptic cues and Foxglove, each with its address; all are off by default."""
+    """UDP, haptic cues, Foxglove and Rerun, each with its address; all are off by default."""
 
     send_udp: bool = setting(
         False,
@@ -63,6 +64,15 @@ class PublishSettings:
             "desktop app.",
         ),
     )
+    send_rerun: bool = setting(
+        False,
+        Switch(
+            "Rerun",
+            "Send the viewer of Rerun the skin, the contact, images of the readings and all "
+            "numbers over time. Start the viewer with the command rerun; it may start later.",
+        ),
+    )
+    rerun_at: str = setting("127.0.0.1:9876", Text("Viewer", "HOST:PORT where the viewer listens."))
 
     @property
     def targets(self) -> list[str]:
@@ -70,8 +80,9 @@ class PublishSettings:
         udp = [f"udp://{place.strip()}" for place in self.udp_to.split(",")]
         cues = [f"cue://{place.strip()}" for place in self.cues_to.split(",")]
         foxglove = [f"foxglove://{self.foxglove_at.strip()}"]
-        on = (udp, self.send_udp), (cues, self.send_cues), (foxglove, self.serve_foxglove)
-        return [target for targets, switched_on in on if switched_on for target in targets]
+        rerun = [f"rerun://{self.rerun_at.strip()}"]
+        switches = self.send_udp, self.send_cues, self.serve_foxglove, self.send_rerun
+        return [*chain.from_iterable(compress((udp, cues, foxglove, rerun), switches))]
 
     @property
     def origins(self) -> list[str]:

@@ -51,6 +51,10 @@ def test_settings_name_the_targets() -> None:
     both = Settings(send_udp=True, udp_to="robot:1, [::1]:2", serve_foxglove=True)
     assert both.targets == ["udp://robot:1", "udp://[::1]:2", "foxglove://127.0.0.1:8765"]
     assert replace(both, send_udp=False).targets == ["foxglove://127.0.0.1:8765"]
+    assert replace(both, send_udp=False, send_rerun=True, rerun_at=" desk ").targets == [
+        "foxglove://127.0.0.1:8765",
+        "rerun://desk",
+    ]
     felt = Settings(send_cues=True, cues_to="glove:1?force=2, stick")
     assert felt.targets == ["cue://glove:1?force=2", "cue://stick"]
 
@@ -113,7 +117,7 @@ def test_what_comes_of_it_is_in_sight_of_who_asked(qtbot, until) -> None:
     panel, other = PublishPanel(), QLineEdit()
     page = scrolled(other, QLabel("\n" * 40), panel)
     qtbot.addWidget(page)
-    page.resize(300, 331)  # as high as the panel with its counts
+    page.resize(300, 380)  # as high as the panel with its counts
     page.show()
     page.activateWindow()
     box, bar = panel.editor("serve_foxglove"), page.verticalScrollBar()
