@@ -1,7 +1,7 @@
-"""What every estimator makes of a fixed recording, kept beside the revision of the estimates.
+"""What is estimated from fixed readings, kept beside the revision of the estimates.
 
 Run `python tests/estimates.py` when an estimate of the same readings has changed: it raises
-`REVISION` of the pipeline, and writes the new estimates.
+`REVISION` of the pipeline, and writes the new estimates, and their scores in the guide's benchmark.
 """
 
 import json
@@ -21,13 +21,17 @@ from kappaskin.pipeline import REVISION, Pipeline, Reported, Setup, getters
 from kappaskin.recording import Recording
 from kappaskin.recording.recompute import RecordedFrames
 from kappaskin.sensing import Sensor
+from kappaskin_resources.benchmark import methods, score
 
 _HERE = Path(__file__).parent / "core" / "pipeline"
 RECORDING = _HERE / "before-revisions.mcap"
 """Flat skins, the arc of a fingertip, faulty elements and a bent skin: older than revisions."""
 
 ESTIMATES = _HERE / "estimates.json"
-_SOURCE = Path(__file__).parents[1] / "core" / "kappaskin" / "pipeline" / "pipeline.py"
+_ROOT = Path(__file__).parents[1]
+_SOURCE = _ROOT / "core" / "kappaskin" / "pipeline" / "pipeline.py"
+PAGE = _ROOT / "resources" / "kappaskin_resources" / "guide" / "benchmark.md"
+_PRESSES = "presses of the benchmark"
 
 _QUANTITIES = (
     *("noise", "present", "single", "near_rim", "converged", "spare", "suspect"),
@@ -41,7 +45,10 @@ Rows = dict[str, list[list[float]]]
 
 
 def computed() -> dict[str, Rows]:
-    """By device and method, and quantity, a row for each frame of the fixed recording."""
+    """By device and method, and quantity, a row for each frame of the fixed recording.
+
+    And one for each press of the benchmark: pairs, a bent skin and a dome, rigid objects.
+    """
     devices: list[tuple[Sensor, list[Frame]]] = []
     with Recording(RECORDING) as recording:
         frames = RecordedFrames(RECORDING.name)
@@ -50,11 +57,27 @@ def computed() -> dict[str, Rows]:
                 if not devices or devices[-1][0] is not frames.sensor:
                     devices.append((frames.sensor, []))
                 devices[-1][1].append(frame)
-    return {
+    found = {
         f"device {n}, {method}": _rows(sensor, frames, method)
         for n, (sensor, frames) in enumerate(devices)
         for method in METHODS
     }
+    return found | {_PRESSES: {name: [*map(_row, told)] for name, told in _pressed().items()}}
+
+
+def _pressed() -> dict[str, Any]:
+    """What is told of the presses of the benchmark; NaN on the rim, where rounding decides it."""
+    presses = methods.load(methods.OPEN)
+    told = methods.kappaskin(presses)
+    sides = np.array([presses[f"{skin}_sides"] for skin in presses["skin"]])[:, None]
+    on_rim = (np.abs(told["place"] - sides / 2) > 0.49 * sides).any(axis=-1)
+    for name in set(told) - {"count"}:
+        told[name][on_rim] = np.nan
+    return told
+
+
+def _row(value: Any) -> list[float]:
+    return [float(f"{number:.8g}") for number in np.asarray(value, float).ravel()]
 
 
 def _rows(sensor: Sensor, frames: list[Frame], method: str) -> Rows:
@@ -70,8 +93,7 @@ def _rows(sensor: Sensor, frames: list[Frame], method: str) -> Rows:
         found["coefficients"] = [np.linalg.norm(c), *c[:3]]
         found["coefficients_sd"] = pipeline.fitted.sd.ravel()[:3]
         for name, value in found.items():
-            row = np.asarray(value, float).ravel()
-            rows.setdefault(name, []).append([float(f"{number:.8g}") for number in row])
+            rows.setdefault(name, []).append(_row(value))
     return rows
 
 
@@ -101,9 +123,24 @@ def kept() -> tuple[int, dict[str, Rows]]:
     return found["revision"], found["estimates"]
 
 
+def scored(page: str, estimates: dict[str, Rows]) -> str:
+    """The guide's page of the benchmark with the scores of some estimates."""
+    answers = methods.load(methods.OPEN)
+    empty, rows = methods.blank(len(answers["count"])), estimates[_PRESSES]
+    results = {
+        name: np.reshape(rows[name], of.shape).astype(of.dtype) for name, of in empty.items()
+    }
+    before, after = page.split("score results.npz\n```\n\n```text\n", 1)
+    _, after = after.split("```", 1)
+    table = score.table(results, answers)
+    return f"{before}score results.npz\n```\n\n```text\n{table}\n```{after}"
+
+
 def renew() -> str:
     """Keep the present estimates, under a raised `REVISION` if they changed; what was done."""
     now, (revision, was) = computed(), kept() if ESTIMATES.exists() else (REVISION, {})
+    page = scored(PAGE.read_text(encoding="utf-8"), now)
+    PAGE.write_text(page, encoding="utf-8", newline="\n")
     different = changed(now, was)
     if not different and revision == REVISION:
         return f"revision {revision}: the estimates are the same"

@@ -5,12 +5,13 @@ Readings are those of Navier's plate of 240 waves each way, which shares nothing
 """
 
 from dataclasses import replace
+from importlib.resources import files
 
 import numpy as np
 import pytest
 
 from kappaskin import LeastSquares, Patch, Plate, SensorLayout, SineBasis
-from kappaskin.contact import NO_CONTACT, Contacts, as_one
+from kappaskin.contact import NO_CONTACT, Contacts, as_one, drift, two
 from kappaskin.pipeline import reconstruct
 from navier import HingedPlate, Load
 
@@ -28,6 +29,18 @@ def readings(*loads, noise=NOISE):
 
 def told(K, contacts=CONTACTS):
     return contacts(K, FIT(K))
+
+
+def test_the_guide_states_the_limits_in_use():
+    page = (files("kappaskin_resources") / "guide" / "numbers.md").read_text("utf-8")
+    ratio = "\N{MINUS SIGN}2 ln \N{GREEK CAPITAL LETTER LAMDA} >"
+    for limit in (
+        f"more than {100 - 100 * two._MISFIT:g} % of single ones",
+        f"two loads are better by {ratio} {two._SPREAD:g}",
+        f"{ratio} {two._DISTINCT:g} against one load and > {two._NO_LINE:g} against a line",
+        f"more likely by {ratio} {drift._EVIDENT:g} (",
+    ):
+        assert limit in page, f"expected {limit!r} in guide/numbers.md, as in two.py and drift.py"
 
 
 def test_two_contacts_are_told_the_strongest_first():
