@@ -33,14 +33,15 @@ def told(K, contacts=CONTACTS):
 
 def test_the_guide_states_the_limits_in_use():
     page = (files("kappaskin_resources") / "guide" / "numbers.md").read_text("utf-8")
-    ratio = "\N{MINUS SIGN}2 ln \N{GREEK CAPITAL LETTER LAMDA} >"
-    for limit in (
-        f"more than {100 - 100 * two._MISFIT:g} % of single ones",
-        f"two loads are better by {ratio} {two._SPREAD:g}",
-        f"{ratio} {two._DISTINCT:g} against one load and > {two._NO_LINE:g} against a line",
-        f"more likely by {ratio} {drift._EVIDENT:g} (",
+    limits = vars(two) | vars(drift) | {"single": 100 - 100 * vars(two)["_MISFIT"]}
+    for words in (
+        "more than {single:g} % of single ones",
+        "two loads are better by \N{MINUS SIGN}2 ln \N{GREEK CAPITAL LETTER LAMDA} > {_SPREAD:g}",
+        "> {_DISTINCT:g} against one load and > {_NO_LINE:g} against a line",
+        "> {_EVIDENT:g} (one frame",
     ):
-        assert limit in page, f"expected {limit!r} in guide/numbers.md, as in two.py and drift.py"
+        told = words.format_map(limits)
+        assert told in page, f"expected {told!r} in guide/numbers.md, as in two.py and drift.py"
 
 
 def test_two_contacts_are_told_the_strongest_first():
