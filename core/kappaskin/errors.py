@@ -1,6 +1,8 @@
 """Errors: refusals of requests, and missing optional packages."""
 
+import importlib
 import sys
+from typing import Any
 
 
 class Refusal(ValueError):
@@ -25,6 +27,14 @@ class EndedSource(Refusal):
 
 class Damaged(Refusal):
     """A file is not whole, and a repair may save what is."""
+
+
+def optional(module: str, extra: str, purpose: str) -> Any:
+    """The `module` that an optional `extra` installs; a `Refusal` says so where it is missing."""
+    try:
+        return importlib.import_module(module)
+    except ImportError as error:
+        raise lacking(extra, purpose, error) from error
 
 
 def lacking(extra: str, purpose: str, error: ImportError) -> Refusal:

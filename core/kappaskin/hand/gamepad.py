@@ -1,12 +1,11 @@
 """Gamepad: sticks that move a hand, and rumble, by SDL."""
 
-import importlib
 import time
 import warnings
 from collections.abc import Callable
 from typing import Any
 
-from kappaskin.errors import Refusal, lacking
+from kappaskin.errors import Refusal, optional
 from kappaskin.hand.operation import HandTarget, OperatorLimits
 
 _FULL = 32767.0  # of an axis
@@ -21,12 +20,9 @@ _ABSENT = "no gamepad is connected; plug one in"
 
 def sdl() -> Any:
     """SDL, with the gamepads of this machine; a `Refusal` where it is missing."""
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # it says by one which SDL it found
-            found: Any = importlib.import_module("sdl2")
-    except ImportError as error:
-        raise lacking("gamepad", "a gamepad", error) from error
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # it says by one which SDL it found
+        found = optional("sdl2", "gamepad", "a gamepad")
     for hint in (
         found.SDL_HINT_NO_SIGNAL_HANDLERS,
         found.SDL_HINT_JOYSTICK_ALLOW_BACKGROUND_EVENTS,

@@ -1,6 +1,5 @@
 """Publishing: targets such as `udp://HOST:PORT`."""
 
-import importlib
 import math
 import re
 import threading
@@ -13,7 +12,7 @@ from typing import Protocol, cast
 
 import numpy as np
 
-from kappaskin.errors import Refusal, lacking
+from kappaskin.errors import Refusal, optional
 from kappaskin.frames import Estimate
 from kappaskin.pipeline import Pipeline
 from kappaskin.publish.access import THIS_MACHINE, Access
@@ -162,10 +161,8 @@ def reason(error: OSError | UnicodeError) -> str:
 
 def opened(target: Target) -> Publisher:
     """The transport to `target`; a `Refusal` where it cannot be opened. May take seconds."""
-    try:  # by name: a transport is imported when it is first used
-        module = importlib.import_module(f"kappaskin.publish.{target.scheme}")
-    except ImportError as error:
-        raise lacking(target.scheme, str(target), error) from error
+    # By name: a transport is imported when it is first used.
+    module = optional(f"kappaskin.publish.{target.scheme}", target.scheme, str(target))
     return cast("Publisher", module.opened(target))
 
 

@@ -1,6 +1,5 @@
 """Files of other programs: lines, tables and messages to rows of a described sensor."""
 
-import importlib
 import math
 import re
 import sqlite3
@@ -20,7 +19,7 @@ from mcap.records import Channel, Schema
 from numpy.typing import NDArray
 
 from kappaskin._files import ARCHIVE_DAMAGES, Budget, open_file
-from kappaskin.errors import Damaged, Refusal, lacking
+from kappaskin.errors import Damaged, Refusal, optional
 from kappaskin.frames import Array
 from kappaskin.recording.cdr import MessageType, decode
 from kappaskin.recording.messages import STRING
@@ -272,10 +271,7 @@ def _npz_blocks(file: Path, description: Description, scratch: Path) -> Iterator
 
 def _parquet_blocks(file: Path, step: int) -> Generator[_Block]:
     """The columns of a Parquet table, `step` rows at a time."""
-    try:
-        parquet: Any = importlib.import_module("pyarrow.parquet")
-    except ImportError as error:
-        raise lacking("parquet", f"{file}: a .parquet file", error) from error
+    parquet = optional("pyarrow.parquet", "parquet", f"{file}: a .parquet file")
     # Or all of the file would be in memory, not one group of rows.
     streamed = {"pre_buffer": False, "buffer_size": 2**16}
     with open_file(file) as opened, closing(parquet.ParquetFile(opened, **streamed)) as table:

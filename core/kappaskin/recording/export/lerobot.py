@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kappaskin.errors import lacking
+from kappaskin.errors import optional
 from kappaskin.recording.export.tables import Block, Column, TableWriter
 
 _WINDOW = 100  # frames that a rate is taken over: they may come in bursts
@@ -33,11 +33,8 @@ class LeRobotFolder(TableWriter):
     )
 
     def begin(self, scratch: Path) -> None:
-        try:
-            self._arrow: Any = importlib.import_module("pyarrow")
-            parquet: Any = importlib.import_module("pyarrow.parquet")
-        except ImportError as error:
-            raise lacking("parquet", "a .lerobot folder", error) from error
+        parquet = optional("pyarrow.parquet", "parquet", "a .lerobot folder")
+        self._arrow = importlib.import_module("pyarrow")
         readings = [column for column in self.columns if column.name in _READINGS]
         state = [column for column in self.columns if column.name not in ("time", *_READINGS)]
         self._groups = {"state": state, "readings": readings}

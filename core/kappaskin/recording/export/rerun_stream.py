@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
-from kappaskin.errors import lacking
+from kappaskin.errors import optional
 from kappaskin.frames import Array, Estimate
 from kappaskin.pipeline import REPORTED, SEQUENTIAL, Pipeline, Reported, numbers_of
 from kappaskin.recording.export.request import ExportedFrame, ExportRequest, RecordingInfo
@@ -53,10 +53,7 @@ class RerunStream:
     """
 
     def __init__(self, purpose: str, name: str, finger: str = "", about: str = "") -> None:
-        try:
-            self._rr: Any = importlib.import_module("rerun")
-        except ImportError as error:
-            raise lacking("rerun", purpose, error) from error
+        self._rr = optional("rerun", "rerun", purpose)
         self.stream = self._rr.RecordingStream("kappaskin", recording_id=name or None)
         self._root, self._about = f"/{finger}" if finger else "", about
         self._skin: _Skin | None = None

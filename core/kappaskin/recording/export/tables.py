@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kappaskin._text import json_cells
-from kappaskin.errors import lacking
+from kappaskin.errors import optional
 from kappaskin.pipeline import REPORTED, Axes, Getter, axes_of
 from kappaskin.recording.export.request import (
     PRESETS,
@@ -222,11 +222,8 @@ class ParquetTable(TableWriter):
     block = 2**25  # each group of rows describes all columns anew
 
     def begin(self, scratch: Path) -> None:
-        try:
-            self._arrow: Any = importlib.import_module("pyarrow")
-            parquet: Any = importlib.import_module("pyarrow.parquet")
-        except ImportError as error:
-            raise lacking("parquet", "a .parquet file, unlike a .csv,", error) from error
+        parquet = optional("pyarrow.parquet", "parquet", "a .parquet file, unlike a .csv,")
+        self._arrow = importlib.import_module("pyarrow")
         facts = self.info.facts | {"columns": {c.name: c.text for c in self.columns}}
         metadata = {name: v if isinstance(v, str) else json.dumps(v) for name, v in facts.items()}
         kinds = [
@@ -300,10 +297,7 @@ class Hdf5Table(TableWriter):
     """HDF5: data sets that grow with the rows, with scales for their dimensions."""
 
     def begin(self, scratch: Path) -> None:
-        try:
-            self._h5py: Any = importlib.import_module("h5py")
-        except ImportError as error:
-            raise lacking("hdf5", "a .h5 file, unlike an .npz,", error) from error
+        self._h5py = optional("h5py", "hdf5", "a .h5 file, unlike an .npz,")
         self._disk = _File(self.path)
         # Attributes of older versions end at 64 KiB.
         self._file: Any = self._h5py.File(self._disk, "w", libver=("v108", "v108"))

@@ -15,12 +15,11 @@ from concurrent.futures import (
 )
 from contextlib import AbstractContextManager, closing, contextmanager, suppress
 from dataclasses import dataclass
-from importlib import import_module
 from typing import Any, Protocol
 from urllib.parse import urlsplit
 
 from kappaskin._processes import Context, end_with_parent, process_context
-from kappaskin.errors import Refusal, lacking
+from kappaskin.errors import Refusal, optional
 from kappaskin.studies.design.results import (
     BlockMoments,
     BlockTask,
@@ -118,10 +117,7 @@ def study_workers(count: int | None = None, scheduler: str = "") -> AbstractCont
 @contextmanager
 def cluster(address: str) -> Generator[Workers]:
     """The workers of the Dask scheduler at `address`, such as tcp://10.0.0.5:8786."""
-    try:
-        distributed: Any = import_module("distributed")
-    except ImportError as error:
-        raise lacking("cluster", "a scheduler", error) from error
+    distributed = optional("distributed", "cluster", "a scheduler")
     try:
         _check_connection(address)
         client = distributed.Client(address, timeout=_PATIENCE, set_as_default=False)
