@@ -209,16 +209,12 @@ class _SkinPoints:
         """The skin as a foxglove.PointCloud in JSON."""
         flat = message.estimate.coefficients.ravel()
         displacement = self._values @ flat
-        columns = *self._at(displacement).T, displacement, *(self._curvature @ flat)
+        columns = *self._rest.displaced(displacement).T, displacement, *(self._curvature @ flat)
         data = base64.b64encode(np.column_stack(columns).astype("<f4").tobytes()).decode()
         return (
             f'{{"timestamp":{moment(message.timestamp)},"frame_id":"{FRAME}","pose":{_AT_ORIGIN},'
             f'"point_stride":{4 * len(NAMES)},"fields":{_FIELDS},"data":"{data}"}}'
         ).encode()
-
-    def _at(self, displacement: Array) -> Array:
-        """Where the points (k, 3) in m are when displaced by (k,) in m."""
-        return self._rest.points - displacement[:, None] * self._rest.normals
 
     def mesh(self, message: EstimateMessage) -> bytes:
         """The skin as triangles, and the error bars of the contact's place as a line on it.
@@ -234,7 +230,7 @@ class _SkinPoints:
             f"{_ENTITY}timestamp.sec": sec,
             f"{_ENTITY}timestamp.nanosec": nanosec,
             f"{_TRIANGLES}pose.orientation.w": 1,
-            f"{_TRIANGLES}points": self._at(displacement),
+            f"{_TRIANGLES}points": self._rest.displaced(displacement),
             f"{_TRIANGLES}colors": _COLOURS[(255 * np.minimum(deep / limit, 1)).astype(int)],
             f"{_TRIANGLES}indices": self._rest.triangles.ravel(),
         }

@@ -60,6 +60,10 @@ class RestMesh:
             self.positions = grid.reshape(-1, 2)[used]
         self.points, self.normals = patch.at_rest(self.positions)
 
+    def displaced(self, displacement: Array) -> Array:
+        """Where the points (k, 3) in m are when displaced by (k,) in m, positive inward."""
+        return self.points - displacement[:, None] * self.normals
+
 
 def _triangles(on: Mask) -> Indices:
     """Two for each square with a corner `on` the skin, turning left as seen from outside."""

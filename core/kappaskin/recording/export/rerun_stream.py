@@ -137,7 +137,7 @@ class RerunStream:
             self._log(
                 "skin",
                 rr.Mesh3D(
-                    vertex_positions=skin.displaced(displacement),
+                    vertex_positions=skin.rest.displaced(displacement),
                     triangle_indices=skin.rest.triangles,
                     vertex_colors=skin.colours(displacement),
                 ),
@@ -206,10 +206,6 @@ class _Skin:
     def displacement(self, estimate: Estimate) -> Array:
         """Displacement (k,) of the points in m, positive inward."""
         return self._values @ estimate.coefficients.ravel()
-
-    def displaced(self, displacement: Array) -> Array:
-        """Where the points (k, 3) in m are."""
-        return self.rest.points - displacement[:, None] * self.rest.normals
 
     def colours(self, displacement: Array) -> "np.ndarray[Any, np.dtype[np.uint8]]":
         """Colours (k, 3) from 0 to the largest displacement so far, without its sign."""
