@@ -47,16 +47,6 @@ def axes_of(layout: SensorLayout, functions: tuple[int, int], points: tuple[int,
     return axes
 
 
-_SUFFIX = {
-    "": "",
-    "m": "_m",
-    "m^2": "_m2",
-    "N": "_N",
-    "s": "_s",
-    "rad": "_rad",
-    "1/m": "_per_m",
-    "1/m^2": "_per_m2",
-}
 # The least range of colours of readings in a unit over that in 1/m, on the screen's scales.
 _LEAST = {"m": 20.0, "m/m": 2.0, "1/m": 1.0}
 _SD, _INTERVAL = "standard deviation", "Student's t, half width of the 95 % interval"
@@ -159,6 +149,12 @@ def _root(C: list[list[float]], xx: float, yy: float, xy: float) -> float:
     (a, b, c), (_, d, e), (_, _, f) = C
     diagonal = a * xx * xx + d * yy * yy + f * xy * xy
     return math.sqrt(max(0.0, diagonal + 2 * (b * xx * yy + c * xx * xy + e * yy * xy)))
+
+
+def _suffix(unit: str) -> str:
+    """What ends the key of a number in a unit: "_N", "_m2", "_per_m", "_N_per_m2"."""
+    words = unit.replace("1/", "per_").replace("/", "_per_").replace("^", "").replace(" ", "_")
+    return f"_{words}" if unit else ""
 
 
 Getter = Callable[[Reported], Any]
@@ -348,7 +344,7 @@ class ReportedQuantity:
             return self.keys
         if any(isinstance(axis, str) for axis in self.parts):
             return ()
-        suffix = _SUFFIX[self.unit]
+        suffix = _suffix(self.unit)
         return tuple((f"{self.name}{label}{suffix}", self.text) for label in self.labels({}))
 
     @property
@@ -357,7 +353,7 @@ class ReportedQuantity:
             return self.sd_keys
         if self.sd is None:
             return ()
-        suffix = _SUFFIX[self.unit]
+        suffix = _suffix(self.unit)
         return tuple(
             (f"{key.removesuffix(suffix)}_sd{suffix}", f"standard deviation of {key}")
             for key, _ in self._keys
@@ -1180,7 +1176,7 @@ def _of_second(quantity: ReportedQuantity) -> ReportedQuantity:
     )
 
 
-_SECOND = tuple(_of_second(quantity) for quantity in _CONTACT)
+_SECOND = tuple(_of_second(of) for of in _CONTACT if str(of.value).startswith("contact."))
 
 REPORTED = (*_FRAME, *_FIT, *_CONTACT, *_GEOMETRY, *_SECOND, *_TRUTH)
 """Every quantity of an estimate, in the order in which tables have them."""
