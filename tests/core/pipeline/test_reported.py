@@ -7,192 +7,54 @@ import runpy
 import subprocess
 import sys
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
 from kappaskin import load_scene
-from kappaskin.frames import COMPONENTS, Estimate
-from kappaskin.pipeline import REPORTED, getters, readouts, stored
+from kappaskin.frames import Estimate
+from kappaskin.pipeline import REPORTED, ReportedQuantity, getters, readouts, stored
 from kappaskin.publish.foxglove_channels import CHANNELS
 from kappaskin.publish.message import CONTACT, SECOND, SWITCHES
 from kappaskin.recording import messages as m
-from kappaskin.recording.export.tables import columns
 
 TESTS = Path(__file__).parents[2]
 GUIDE = runpy.run_path(str(TESTS / "guide_quantities.py"))
 
-COLUMNS = [
-    "time",
-    "sequence",
-    "setup",
-    "device_time",
-    "host_time",
-    "taken",
-    "taken_sd",
-    "counts",
-    "nominal",
-    "curvature",
-    "fresh",
-    "residual",
-    "suspect",
-    "coefficients",
-    "noise",
-    "converged",
-    "drift",
-    "present",
-    "single",
-    "near_rim",
-    "force_is_lower_bound",
-    "force_is_upper_bound",
-    "snaps_through",
-    "spare",
-    "position",
-    "position_sd",
-    "position_95",
-    "force",
-    "force_sd",
-    "force_95",
-    "displacement",
-    "displacement_sd",
-    "load_radius",
-    "load_radius_95",
-    "point",
-    "frame",
-    "metric",
-    "curvature_form",
-    "torsion_form",
-    "covariance",
-    "principal",
-    "principal_sd",
-    "angle",
-    "second_present",
-    "second_position",
-    "second_position_sd",
-    "second_position_95",
-    "second_force",
-    "second_force_sd",
-    "second_force_95",
-]
-"""Names of columns of CSV and HDF5 files and of arrays of NPZ files, which others read."""
 
-UNITS = {
-    **dict.fromkeys(("time", "device_time", "host_time", "taken", "taken_sd"), "s"),
-    **dict.fromkeys(("nominal", "curvature", "residual", "noise", "drift"), "1/m"),
-    **dict.fromkeys(("coefficients", "position", "position_sd", "position_95", "point"), "m"),
-    **dict.fromkeys(("displacement", "displacement_sd", "load_radius", "load_radius_95"), "m"),
-    **dict.fromkeys(("force", "force_sd", "force_95"), "N"),
-    **dict.fromkeys(("curvature_form", "torsion_form", "principal", "principal_sd"), "1/m"),
-    **{"covariance": "1/m^2", "angle": "rad"},
-    **dict.fromkeys(("second_position", "second_position_sd", "second_position_95"), "m"),
-    **dict.fromkeys(("second_force", "second_force_sd", "second_force_95"), "N"),
-}
-
-HEADS = """
-position_x [m],position_y [m],position_sd_x [m],position_sd_y [m]
-position_95_x [m],position_95_y [m]
-force [N],force_sd [N],force_95 [N],displacement [m],displacement_sd [m]
-load_radius [m],load_radius_95_low [m],load_radius_95_high [m]
-point_x [m],point_y [m],point_z [m]
-frame_t_x,frame_t_y,frame_t_z,frame_s_x,frame_s_y,frame_s_z,frame_n_x,frame_n_y,frame_n_z
-metric_t_x,metric_t_y,metric_s_x,metric_s_y
-curvature_form_t_t [1/m],curvature_form_t_s [1/m],curvature_form_s_t [1/m],curvature_form_s_s [1/m]
-torsion_form_t [1/m],torsion_form_s [1/m]
-""".replace("\n", ",").strip(",")
-"""Part of the line at the head of a CSV file."""
-
-KEYS = [
-    "timestamp",
-    "number",
-    "sequence",
-    "generation",
-    "device_time_s",
-    "taken_sd_s",
-    "age_s",
-    "noise_per_m",
-    "drift_per_m",
-    "x_m",
-    "y_m",
-    "x_sd_m",
-    "y_sd_m",
-    "force_N",
-    "force_sd_N",
-    "displacement_m",
-    "displacement_sd_m",
-    "load_radius_m",
-    "load_radius_low_m",
-    "load_radius_high_m",
-    "position_x_m",
-    "position_y_m",
-    "position_z_m",
-    "position_x_sd_m",
-    "position_y_sd_m",
-    "position_z_sd_m",
-    "normal_x",
-    "normal_y",
-    "normal_z",
-    "normal_sd_rad",
-    "curvature_1_per_m",
-    "curvature_1_sd_per_m",
-    "curvature_2_per_m",
-    "curvature_2_sd_per_m",
-    "direction_1_x",
-    "direction_1_y",
-    "direction_1_z",
-    "direction_2_x",
-    "direction_2_y",
-    "direction_2_z",
-    "direction_sd_rad",
-]
-"""Keys of the numbers in a message by UDP or Foxglove, which others read."""
-
-FLAGS = [
-    *("present", "single", "near_rim"),
-    *("force_is_lower_bound", "force_is_upper_bound", "snaps_through", "shape_follows"),
-]
-
-
-@pytest.fixture
-def made() -> list:
-    sensor = load_scene("centre").sensor()
-    return list(columns(SimpleNamespace(sensor=sensor, functions=(5, 4)), ()))  # pyright: ignore
-
-
-def test_columns_are_called_as_they_always_were(made) -> None:
-    assert [column.name for column in made] == COLUMNS
-    assert {column.name: column.unit for column in made if column.unit} == UNITS
-    heads = ",".join(head for column in made for head in column.heads())
-    assert HEADS in heads
-    P = made[COLUMNS.index("suspect")].shape[0]
-    readings = [f"curvature_{name}_{n} [1/m]" for name in COMPONENTS for n in range(P)]
-    assert ",".join(readings) in heads
-    assert "coefficients_0_3 [m],coefficients_1_0 [m]" in heads
-
-
-def test_columns_have_the_types_that_they_always_had(made) -> None:
-    kinds = {column.name: column.kind for column in made if column.kind != "<f8"}
-    assert kinds == {
-        **dict.fromkeys(("sequence", "setup", "spare"), "<i8"),
-        **dict.fromkeys(("fresh", "converged", "present", "single", "near_rim"), "?"),
-        "second_present": "?",
-        **dict.fromkeys(("force_is_lower_bound", "force_is_upper_bound", "snaps_through"), "?"),
-        "suspect": "|u1",
-    }
-
-
-def test_messages_have_the_keys_that_they_always_had() -> None:
-    assert [number.key for number in CONTACT] == KEYS
-    assert list(SWITCHES) == FLAGS
+def test_a_message_of_foxglove_has_the_keys_of_one_by_udp() -> None:
     schema = json.loads(CHANNELS[0].schema)["properties"]
-    assert list(schema) == ["kind", "version", "source", *FLAGS, *KEYS, "second"]
-    second = ["x_m", "y_m", "x_sd_m", "y_sd_m", "force_N", "force_sd_N"]
-    assert [number.key for number in SECOND] == list(schema["second"]["properties"]) == second
+    keys = [*SWITCHES, *(number.key for number in CONTACT)]
+    assert list(schema) == ["kind", "version", "source", *keys, "second"]
+    assert list(schema["second"]["properties"]) == [number.key for number in SECOND]
 
 
-def test_names_are_one_of_a_kind_and_every_unit_has_a_suffix() -> None:
+@pytest.mark.parametrize(
+    ("unit", "key"), [("", "x"), ("W", "x_W"), ("N/m", "x_N_per_m"), ("1/m^2", "x_per_m2")]
+)
+def test_the_key_of_a_number_ends_in_its_unit(unit: str, key: str) -> None:
+    (number,) = ReportedQuantity("x", unit, "what it is", "contact.force").published
+    assert number.key == key
+
+
+def test_each_quantity_is_the_field_of_its_name() -> None:
+    others = {"setup": "generation", "point": "position", "load_size": "size"}
+    others |= {"direction": "directions"}
+    for of in REPORTED:
+        name = of.name.removeprefix("second_")
+        ends = {of.value: "", of.sd: "_sd", of.half_width: "_95"}
+        for path in (path for path in ends if isinstance(path, str) and path != "noise"):
+            field = others.get(name, name) + ends[path]
+            assert path.rpartition(".")[2] == field, f"expected {of.name} to get {field}"
+
+
+def test_a_second_contact_has_what_is_its_own() -> None:
+    values = [str(of.value) for of in REPORTED if of.group == "second"]
+    assert all(value.startswith("second.") for value in values)
+
+
+def test_names_are_one_of_a_kind() -> None:
     names = [f"{q.name}{suffix}" for q in REPORTED for suffix, _, _ in q.forms]
     assert len(set(names)) == len(names)
-    assert all(number.key for quantity in REPORTED for number in quantity.published)
 
 
 def test_everything_recorded_of_a_contact_can_be_verified() -> None:
