@@ -181,7 +181,8 @@ def test_readouts_are_the_estimate_in_units_of_the_screen(messages_of) -> None:
     (made,) = messages_of(load_scene("off-centre"))
     touch, geometry = made.estimate.contact, made.estimate.geometry
     found = {each.label: each for each in readouts(made.estimate)}
-    assert list(found)[:4] == ["Contact x", "Contact y", "Force", "Depth"]
+    first = ["Contact x", "Contact y", "Force", "Depth"]
+    assert list(found)[:4] == first, "others come after these on the screen"
     assert found["Contact y"].value == 1e3 * touch.position[1]
     assert found["Contact y"].half_width == 1e3 * touch.position_95[1]
     assert (found["Force"].value, found["Force"].unit) == (touch.force, "N")

@@ -18,7 +18,7 @@ def test_the_revision_is_raised_where_an_estimate_of_the_same_readings_changed()
     found = revision, estimates.changed(estimates.computed(), kept)
     assert found == (REVISION, []), (
         "the same readings give other estimates; if that is meant, run `python tests/estimates.py` "
-        "and go on as under *An estimator's answer* in CONTRIBUTING.md"
+        "and go on as under *Change an estimator* in CONTRIBUTING.md"
     )
 
 
