@@ -33,8 +33,8 @@ class LeRobotFolder(TableWriter):
     )
 
     def begin(self, scratch: Path) -> None:
-        parquet = optional("pyarrow.parquet", "parquet", "a .lerobot folder")
-        self._arrow = importlib.import_module("pyarrow")
+        self._arrow = optional("pyarrow", "parquet", "a .lerobot folder")
+        parquet: Any = importlib.import_module("pyarrow.parquet")
         readings = [column for column in self.columns if column.name in _READINGS]
         state = [column for column in self.columns if column.name not in ("time", *_READINGS)]
         self._groups = {"state": state, "readings": readings}

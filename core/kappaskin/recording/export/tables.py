@@ -222,8 +222,8 @@ class ParquetTable(TableWriter):
     block = 2**25  # each group of rows describes all columns anew
 
     def begin(self, scratch: Path) -> None:
-        parquet = optional("pyarrow.parquet", "parquet", "a .parquet file, unlike a .csv,")
-        self._arrow = importlib.import_module("pyarrow")
+        self._arrow = optional("pyarrow", "parquet", "a .parquet file, unlike a .csv,")
+        parquet: Any = importlib.import_module("pyarrow.parquet")
         facts = self.info.facts | {"columns": {c.name: c.text for c in self.columns}}
         metadata = {name: v if isinstance(v, str) else json.dumps(v) for name, v in facts.items()}
         kinds = [
