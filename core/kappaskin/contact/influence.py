@@ -1055,7 +1055,8 @@ def _nodes(plate: Plate, elements: int) -> tuple[int, int]:
     patch = plate.patch
     least = math.sqrt(patch.a * patch.b * 4 * 3 * elements / _MOST_BYTES)
     near = max(min(patch.a, patch.b) / (_NODES - 1), least)
-    near = min(near, max(_decay(plate) / _PER_DECAY, least / 2))
+    if not patch.arc_curvature:  # along whose arc a load is felt further
+        near = min(near, max(_decay(plate) / _PER_DECAY, least / 2))
     nx, ny = (max(math.ceil(side / near * (1 - 1e-9)) + 1, 5) for side in (patch.a, patch.b))
     return nx, ny
 

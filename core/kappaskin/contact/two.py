@@ -10,7 +10,7 @@ import numpy as np
 from kappaskin.bases import held_near
 from kappaskin.contact.drift import FittedDrift, SmoothDrift
 from kappaskin.contact.geometry import contact_geometry
-from kappaskin.contact.influence import BY_PROFILE, influence_of, read_of_modes, sizes_on
+from kappaskin.contact.influence import BY_PROFILE, Single, influence_of, read_of_modes, sizes_on
 from kappaskin.contact.point import NO_CONTACT, PointContact, left_by_chance
 from kappaskin.estimation import Fit, PatternCache
 from kappaskin.frames import Array, Contact, LocalGeometry, Mask
@@ -278,14 +278,15 @@ class _Pairs:
         self._felt = self._basis.at(self._places)
         self._M = M * self._loads.influence.unit
         read = self._felt @ M.T
-        self._alone = read / np.linalg.norm(read, axis=1, keepdims=True)
+        read /= np.linalg.norm(read, axis=1, keepdims=True)
+        self._alone: Single = read.astype(np.float32)
         self._pairs = PatternCache[tuple[Array, Array, Array]]()
         self.left = math.nan
         """Weighted sum of squares that the last two loads leave of readings over their noise."""
 
     def hint(self, rest: Array) -> float:
         """What another load takes off the sum of squares of the `rest` (C,) at least."""
-        return float(np.square(self._alone @ rest).max())
+        return float(np.square(self._alone @ rest.astype(np.float32)).max())
 
     def __call__(
         self, K: Array, fit: Fit, contact: Contact, noise: float
@@ -300,18 +301,22 @@ class _Pairs:
         hint, beside = self._beside(single, readings)
         if hint < _HINT:
             return contact, NO_CONTACT
-        starts = np.vstack([alone, beside]), self._found(readings)
-        tried = [self._climbed(several, start, readings) for start in starts]
-        two = min(tried, key=lambda each: each.cost)
-        spare = int(used.sum()) - two.p.size
-        variance = two.left / spare
-        one = self._climbed(several, alone, readings, two.cost + _DISTINCT * variance)
-        better = one.worse(two, variance)
-        contact = replace(contact, single=contact.single and better < _SPREAD)
-        if better < _DISTINCT or not self._explains(two, spare, fit, one.left - two.left):
-            return contact, NO_CONTACT
+        starts = [np.vstack([alone, beside]), self._found(readings)]
+        starts.sort(key=lambda each: _tried(several, each, readings).cost)
+        best = 0.0
+        for start in starts if hint > _DISTINCT else starts[:1]:
+            two = self._climbed(several, start, readings)
+            spare = int(used.sum()) - two.p.size
+            variance = two.left / spare
+            one = self._climbed(several, alone, readings, two.cost + _DISTINCT * variance)
+            better = one.worse(two, variance)
+            if better > _DISTINCT and self._explains(two, spare, fit, one.left - two.left):
+                break
+            best = max(best, better)
+        else:
+            return replace(contact, single=contact.single and best < _SPREAD), NO_CONTACT
         if self._is_line(two, variance, readings):
-            return contact, NO_CONTACT
+            return replace(contact, single=False), NO_CONTACT
         self.left = two.left
         return self._told(two, spare, fit, noise)
 
