@@ -415,7 +415,7 @@ class _OfPlate:
         self._last = nx - 4, ny - 4
         self._out, self._of_size = out, _Sizes(variances)
         self._disc = _DiscOnGages(positions, length, out) if length else _Disc(positions, out)
-        self._weights = np.empty((4, len(variances), 16), np.float32)
+        self._weights = np.empty((4, len(variances), 16), self._table.dtype)
         self._all, self._cubics = self._weights.reshape(4, -1), np.empty((4, 4))
         self._block = lru_cache(16)(self._block_at)
 
@@ -425,7 +425,7 @@ class _OfPlate:
         i, j = min(max(int(x / hx) - 1, 0), last_x), min(max(int(y / hy) - 1, 0), last_y)
         return i, j, x / hx - i, y / hy - j
 
-    def _block_at(self, i: int, j: int) -> Single:
+    def _block_at(self, i: int, j: int) -> "np.ndarray[Any, np.dtype[np.floating[Any]]]":
         table = self._table[:, j : j + 4, i : i + 4]
         return table.reshape(-1, table.shape[-1])
 
@@ -919,7 +919,7 @@ def _rounded(values: Array) -> Array:
 @lru_cache(4)
 def _rest_of(
     plate: Plate, edge: str, places: bytes, gage_length: float
-) -> tuple[Single, Array, Array]:
+) -> tuple["np.ndarray[Any, np.dtype[np.floating[Any]]]", Array, Array]:
     """What the edges make of a load at each node, in the units of `_Disc`.
 
     A table (n, ny, nx, C) of the readings of n Gaussian loads less those on a plate without edges;
@@ -929,7 +929,8 @@ def _rest_of(
     layout = replace(SensorLayout.scattered(patch, positions), gage_length=gage_length)
     largest = sizes_on(patch)[2] / 4
     shares = _MANY if largest > _WIDE * _decay(plate) ** 2 else (0.0, 1.0)
-    x, y = patch.grid(*_nodes(plate, len(shares) * len(positions)))
+    kind = np.dtype(np.float64 if len(shares) == 2 else np.float32)
+    x, y = patch.grid(*_nodes(plate, 3 * len(positions) * len(shares) * kind.itemsize))
     is_shell = patch.arc_curvature and edge in _SINES
     of_skin = _of_shell if is_shell else _of_functions
 
@@ -948,7 +949,7 @@ def _rest_of(
         rests = [first, first + largest / 2 * (_second(first, y, 0) + _second(first, x, 1))]
     else:
         rests = [first, *(rest(math.sqrt(each))[0] for each in variances[1:].tolist())]
-    return np.stack(rests).astype(np.float32), gives, variances
+    return np.stack(rests).astype(kind), gives, variances
 
 
 def _of_functions(
@@ -1050,10 +1051,13 @@ def _check_decay(plate: Plate, functions: int) -> None:
         )
 
 
-def _nodes(plate: Plate, elements: int) -> tuple[int, int]:
-    """Nodes along x and y: as near one another along both, and within the memory."""
+def _nodes(plate: Plate, each: int) -> tuple[int, int]:
+    """Nodes along x and y: as near one another along both, and within the memory.
+
+    Each takes so many bytes.
+    """
     patch = plate.patch
-    least = math.sqrt(patch.a * patch.b * 4 * 3 * elements / _MOST_BYTES)
+    least = math.sqrt(patch.a * patch.b * each / _MOST_BYTES)
     near = max(min(patch.a, patch.b) / (_NODES - 1), least)
     if not patch.arc_curvature:  # along whose arc a load is felt further
         near = min(near, max(_decay(plate) / _PER_DECAY, least / 2))
