@@ -379,6 +379,27 @@ def _trust(t: Array, s: float, share: float) -> Array | None:
     return np.reciprocal(under, under)
 
 
+class _Sizes:
+    """What a load of any size makes where that is smooth, of what n Gaussian loads make.
+
+    Their `variances` (n,) are in m^2. It is followed by a polynomial of the variance, of which a
+    disc has other even moments than a Gaussian as wide.
+    """
+
+    def __init__(self, variances: Array) -> None:
+        self._widest, n = float(variances[-1]), len(variances)
+        self._shares = np.linalg.inv(np.vander(variances / self._widest, increasing=True))
+        self._powers = k = np.arange(float(n))
+        of_disc = 2.0**k / scipy.special.factorial(k + 1)
+        self._moments = np.stack([of_disc, 1 - of_disc, k * of_disc, k * (1 - of_disc)])
+
+    def __call__(self, s: float) -> Array:
+        """Shares (4, n): of a disc of s = r^2, of what a Gaussian differs, and both by s."""
+        sizes = (s / 4 / self._widest) ** self._powers * self._moments
+        sizes[2:] /= s
+        return sizes.dot(self._shares)
+
+
 class _OfPlate:
     """A plate's or a shell's: in closed form what grows without bound, and a table of the rest."""
 
@@ -388,14 +409,14 @@ class _OfPlate:
     def __init__(self, plate: Plate, layout: SensorLayout, edge: str, out: Array) -> None:
         self.unit = 8 * math.pi * plate.rigidity
         positions, length = layout.positions, layout.gage_length
-        self._table, self._gives, sd = _rest_of(plate, edge, positions.tobytes(), length)
+        self._table, self._gives, variances = _rest_of(plate, edge, positions.tobytes(), length)
         patch, (ny, nx) = plate.patch, self._gives.shape
         self._steps = patch.a / (nx - 1), patch.b / (ny - 1)
         self._last = nx - 4, ny - 4
-        self._out, self._smooth = out, sd**2 / 2
+        self._out, self._of_size = out, _Sizes(variances)
         self._disc = _DiscOnGages(positions, length, out) if length else _Disc(positions, out)
-        self._weights = np.zeros((4, 2, 16))
-        self._both, self._cubics = self._weights.reshape(4, 32), np.empty((4, 4))
+        self._weights = np.empty((4, len(variances), 16), self._table.dtype)
+        self._all, self._cubics = self._weights.reshape(4, -1), np.empty((4, 4))
         self._block = lru_cache(16)(self._block_at)
 
     def _among_nodes(self, x: float, y: float) -> tuple[int, int, float, float]:
@@ -404,8 +425,9 @@ class _OfPlate:
         i, j = min(max(int(x / hx) - 1, 0), last_x), min(max(int(y / hy) - 1, 0), last_y)
         return i, j, x / hx - i, y / hy - j
 
-    def _block_at(self, i: int, j: int) -> Array:
-        return self._table[:, j : j + 4, i : i + 4].reshape(32, -1)
+    def _block_at(self, i: int, j: int) -> "np.ndarray[Any, np.dtype[np.floating[Any]]]":
+        table = self._table[:, j : j + 4, i : i + 4]
+        return table.reshape(-1, table.shape[-1])
 
     def at(self, x: float, y: float, s: float) -> None:
         self._disc(x, y, s)
@@ -421,12 +443,10 @@ class _OfPlate:
         cubics = np.dot(powers, CUBICS, self._cubics)
         # Value and slopes along x and y; the fourth, which is mixed, gives way to that by size.
         pairs = (cubics[2:, None, :, None] * cubics[None, :2, None]).reshape(4, 16)
-        weights[:, 0] = pairs
-        # The mean over a disc of what is smooth is its value and s/8 of its Laplacian.
-        np.multiply(pairs, s / 8 - self._smooth, weights[:, 1])
-        weights[3, 0] = 0.0
-        np.multiply(pairs[0], 0.125, weights[3, 1])
-        self._out += self._both.dot(self._block(i, j))
+        of_disc, _, by_size, _ = self._of_size(s)[..., None]
+        np.multiply(pairs[:3, None], of_disc, weights[:3])
+        np.multiply(pairs[0], by_size, weights[3])
+        self._out += self._all.dot(self._block(i, j))
 
     def trust(self, s: float, share: float) -> Array | None:
         return _trust(self._disc.t, s, share)
@@ -610,13 +630,7 @@ class _OfMesh:
         places = np.column_stack([layout.positions, turns]).tobytes()
         table, variances = _rest_on_mesh(plate, edge, places, length)
         self._block = lru_cache(32)(partial(self._mesh.splines.block, table))
-        # Lagrange's polynomials through the variances of the table, by powers of the variance,
-        # and what a disc's even moments are of those of a Gaussian as wide.
-        self._widest, n = float(variances[-1]), len(variances)
-        self._shares = np.linalg.inv(np.vander(variances / self._widest, increasing=True))
-        self._powers = k = np.arange(float(n))
-        of_disc = 2.0**k / scipy.special.factorial(k + 1)
-        self._moments = np.stack([of_disc, 1 - of_disc, k * of_disc, k * (1 - of_disc)])
+        self._of_size = _Sizes(variances)
         self._basis = _basis_of(plate, edge, _ON_MESH)
         self._compliance = plate.compliance(self._basis)
         N, area = self._basis.size, float(self._mesh.areas.sum())
@@ -663,9 +677,7 @@ class _OfMesh:
         first, weights = mesh.splines.at(x, y)
         rest = weights[:3].dot(self._block(*first))
         # What is smooth, of the place and by x and y: of a disc, and how a Gaussian load differs.
-        sizes = (s / 4 / self._widest) ** self._powers * self._moments
-        sizes[2:] /= s
-        shares = sizes.dot(self._shares)
+        shares = self._of_size(s)
         np.matmul(shares, rest.reshape(3, shares.shape[1], -1), out=self._smooth)
         out[:3] += self._smooth[:, 0]
         out[3] += self._smooth[0, 2]
@@ -907,41 +919,56 @@ def _rounded(values: Array) -> Array:
 @lru_cache(4)
 def _rest_of(
     plate: Plate, edge: str, places: bytes, gage_length: float
-) -> tuple[Array, Array, float]:
-    """What the edges make of a load at each node, in the units of `_disc`.
+) -> tuple["np.ndarray[Any, np.dtype[np.floating[Any]]]", Array, Array]:
+    """What the edges make of a load at each node, in the units of `_Disc`.
 
-    A table (2, ny, nx, C) of the readings of a Gaussian load less those on a plate without edges,
-    and their Laplacian by the place of the load; displacements (ny, nx) in m per N under a point
-    load; and the standard deviation of the Gaussian in m.
+    A table (n, ny, nx, C) of the readings of n Gaussian loads less those on a plate without edges;
+    displacements (ny, nx) in m per N under a point load; and the variances of the loads in m^2.
     """
     patch, positions = plate.patch, np.frombuffer(places).reshape(-1, 2)
     layout = replace(SensorLayout.scattered(patch, positions), gage_length=gage_length)
-    x, y = patch.grid(*_nodes(plate, len(positions)))
+    largest = sizes_on(patch)[2] / 4
+    shares = _MANY if largest > _WIDE * _decay(plate) ** 2 else (0.0, 1.0)
+    kind = np.dtype(np.float64 if len(shares) == 2 else np.float32)
+    x, y = patch.grid(*_nodes(plate, 3 * len(positions) * len(shares) * kind.itemsize))
     is_shell = patch.arc_curvature and edge in _SINES
     of_skin = _of_shell if is_shell else _of_functions
-    rest, gives, sd = of_skin(plate, layout, edge, x, y)
-    for i in range(0, len(positions), _TOGETHER):
-        part = slice(i, i + _TOGETHER)
-        d = positions[part].T[:, None, None] - np.stack(np.meshgrid(x, y))[..., None]
-        rest[..., part] -= np.moveaxis(_under_gaussian(d, sd, gage_length), 0, 2)
-    rest = rest.reshape(len(y), len(x), -1)
-    return np.stack([rest, _second(rest, y, 0) + _second(rest, x, 1)]), gives, sd
+
+    def rest(least: float) -> tuple[Array, Array, float]:
+        """Readings (ny, nx, C) of a Gaussian load of this standard deviation at least."""
+        found, gives, sd = of_skin(plate, layout, edge, x, y, least)
+        for i in range(0, len(positions), _TOGETHER):
+            part = slice(i, i + _TOGETHER)
+            d = positions[part].T[:, None, None] - np.stack(np.meshgrid(x, y))[..., None]
+            found[..., part] -= np.moveaxis(_under_gaussian(d, sd, gage_length), 0, 2)
+        return found.reshape(len(y), len(x), -1), gives, sd
+
+    first, gives, sd = rest(0.0)
+    variances = sd**2 + np.array(shares) * largest
+    if len(shares) == 2:  # the mean over a load is the value and half its variance of the Laplacian
+        rests = [first, first + largest / 2 * (_second(first, y, 0) + _second(first, x, 1))]
+    else:
+        rests = [first, *(rest(math.sqrt(each))[0] for each in variances[1:].tolist())]
+    return np.stack(rests).astype(kind), gives, variances
 
 
 def _of_functions(
-    plate: Plate, layout: SensorLayout, edge: str, x: Array, y: Array
+    plate: Plate, layout: SensorLayout, edge: str, x: Array, y: Array, least: float
 ) -> tuple[Array, Array, float]:
-    """Readings (ny, nx, 3, P) under a Gaussian load at each node, and the rest of `_rest_of`."""
+    """Readings (ny, nx, 3, P) under a Gaussian load at each node, and displacements.
+
+    And the standard deviation of the load in m, which is the `least` if it can be followed.
+    """
     if edge in _SINES and not plate.mixes_sines:
-        sines, sd = _sines(plate)
+        sines, sd = _sines(plate, least)
         return *_felt(plate, layout, sines, _means(sines, x, y, sd), x, y), sd
-    basis, sd = _mixed(plate.patch, edge)
+    basis, sd = _mixed(plate.patch, edge, least)
     if not plate.patch.is_shallow:
         return *_felt(plate, layout, basis, _means(basis, x, y, sd), x, y), sd
     # So few functions do not follow how a load fades on a skin that stretches. Sines do where the
     # edges are diaphragms; what other edges change is smooth.
     usual, sines = replace(plate, inplane="diaphragm"), SineBasis(plate.patch, *basis.shape)
-    fine, fine_gives, sd = _of_functions(usual, layout, "hinged", x, y)
+    fine, fine_gives, sd = _of_functions(usual, layout, "hinged", x, y, least)
     (read, gives), (usual_read, usual_gives) = (
         _felt(skin, layout, few, _means(few, x, y, sd), x, y)
         for skin, few in ((plate, basis), (usual, sines))
@@ -970,10 +997,10 @@ def _felt(
 
 
 def _of_shell(
-    plate: Plate, layout: SensorLayout, edge: str, x: Array, y: Array
+    plate: Plate, layout: SensorLayout, edge: str, x: Array, y: Array, least: float
 ) -> tuple[Array, Array, float]:
     """As `_of_functions`, as a shell."""
-    sd = max(_SD * min(plate.patch.a, plate.patch.b), Shell.finest_on(plate.patch))
+    sd = max(_SD * min(plate.patch.a, plate.patch.b), Shell.finest_on(plate.patch), least)
     shell = Shell(plate.sheet(sliding=edge == "sliding"), sd)
     T, gives = shell.readings_under(layout, x, y)
     unit = 8 * math.pi * plate.rigidity
@@ -981,12 +1008,12 @@ def _of_shell(
 
 
 def _decay(plate: Plate) -> float:
-    """Distance in m over which what stretching adds to a load on a domed skin fades.
+    """Distance in m over which what stretching adds to a load on a curved skin fades.
 
     (D / (E h H^2))^(1/4), with the mean over all directions of H^2 = (c^2 / Ry + s^2 / Rx)^2.
     """
     patch = plate.patch
-    Hx, Hy = patch.curvatures if patch.is_shallow or isinstance(patch, Cap) else (0.0, 0.0)
+    Hx, Hy = (0.0, 0.0) if patch.strip else patch.curvatures
     square = (3 * Hx**2 + 3 * Hy**2 + 2 * Hx * Hy) / 8
     if isinstance(patch, MeshSkin):
         xx, yy, xy = patch.read_at_rest(patch.places)
@@ -1008,6 +1035,8 @@ def _check_decay(plate: Plate, functions: int) -> None:
     wave of so many functions.
     """
     patch = plate.patch
+    if patch.arc_curvature:
+        return
     least, remedy = max(patch.a, patch.b) / functions / math.pi, "check thickness and radii"
     if isinstance(patch, MeshSkin):
         least = _STEPS_OF_DECAY * float(patch.splines.step.max())
@@ -1022,32 +1051,36 @@ def _check_decay(plate: Plate, functions: int) -> None:
         )
 
 
-def _nodes(plate: Plate, elements: int) -> tuple[int, int]:
-    """Nodes along x and y: as near one another along both, and within the memory."""
+def _nodes(plate: Plate, each: int) -> tuple[int, int]:
+    """Nodes along x and y: as near one another along both, and within the memory.
+
+    Each takes so many bytes.
+    """
     patch = plate.patch
-    least = math.sqrt(patch.a * patch.b * 2 * 8 * 3 * elements / _MOST_BYTES)
+    least = math.sqrt(patch.a * patch.b * each / _MOST_BYTES)
     near = max(min(patch.a, patch.b) / (_NODES - 1), least)
-    near = min(near, max(_decay(plate) / _PER_DECAY, least / 2))
+    if not patch.arc_curvature:  # along whose arc a load is felt further
+        near = min(near, max(_decay(plate) / _PER_DECAY, least / 2))
     nx, ny = (max(math.ceil(side / near * (1 - 1e-9)) + 1, 5) for side in (patch.a, patch.b))
     return nx, ny
 
 
-def _sines(plate: Plate) -> tuple[SineBasis, float]:
+def _sines(plate: Plate, least: float) -> tuple[SineBasis, float]:
     """Sines that follow a Gaussian load, and its standard deviation in m."""
     sides = plate.patch.a, plate.patch.b
     sd = min(_SD * min(sides), _SD_OF_DECAY * _decay(plate))
-    sd = max(sd, _VANISHED * max(sides) / (math.pi * _MOST_WAVES))
+    sd = max(sd, _VANISHED * max(sides) / (math.pi * _MOST_WAVES), least)
     Ni, Nj = (math.ceil(_VANISHED * side / (math.pi * sd)) for side in sides)
     return SineBasis(plate.patch, Ni, Nj), sd
 
 
-def _mixed(patch: Patch, edge: str) -> tuple[ProductBasis, float]:
+def _mixed(patch: Patch, edge: str, least: float) -> tuple[ProductBasis, float]:
     """The same of other functions: as fine along both sides, as many as a matrix may have."""
     shorter = min(patch.a, patch.b)
     most = min(_MIXED, math.sqrt(_MOST_MIXED * shorter / max(patch.a, patch.b)))
     Ni, Nj = (math.ceil(most * side / shorter) for side in (patch.a, patch.b))
     mixed = cast("ProductBasis", basis_for(patch, edge, Ni, Nj))
-    return mixed, _MIXED_SD * shorter / (math.pi * most)
+    return mixed, max(_MIXED_SD * shorter / (math.pi * most), least)
 
 
 def _means(basis: ProductBasis, x: Array, y: Array, sd: float) -> tuple[Array, Array]:

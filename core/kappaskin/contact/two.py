@@ -10,7 +10,7 @@ import numpy as np
 from kappaskin.bases import held_near
 from kappaskin.contact.drift import FittedDrift, SmoothDrift
 from kappaskin.contact.geometry import contact_geometry
-from kappaskin.contact.influence import BY_PROFILE, influence_of, read_of_modes, sizes_on
+from kappaskin.contact.influence import BY_PROFILE, Single, influence_of, read_of_modes, sizes_on
 from kappaskin.contact.point import NO_CONTACT, PointContact, left_by_chance
 from kappaskin.estimation import Fit, PatternCache
 from kappaskin.frames import Array, Contact, LocalGeometry, Mask
@@ -25,6 +25,7 @@ _LEFT = 0.01  # of pairs: beyond it, two loads do not explain the readings eithe
 _HINT = 12.0  # that a second load promises in first order: below it, none is tried
 _SPREAD = 25.0  # by which two loads must be better than one, for the load to be distributed
 _DISTINCT = 32.0  # and to be told as two
+_THIRD = 0.1  # of what a second load takes off: where a third would, it is no sum of two
 _NO_LINE = 12.0  # and by which they must be better than a line
 
 _SEARCHED = 17  # points searched along each side
@@ -82,7 +83,7 @@ class Contacts:
         rest = self._one.rest
         left = float(rest.dot(rest))
         if found[1].present and self._pairs is not None:
-            left = self._pairs.left * float(fit.noise) ** 2
+            left = self._pairs.left * self._noise**2
         self.drift = self._drift(curvature, fit, found, rest, left)
         return self.drift.contacts if self.drift else found
 
@@ -93,17 +94,22 @@ class Contacts:
     def _pressed(self, curvature: Array, fit: Fit) -> tuple[Contact, Contact]:
         """The contacts where nothing drifts."""
         contact, misfit = self._one(curvature, fit), self._one.misfit
-        if not contact.present or misfit <= left_by_chance(_LOOKED_AT, contact.spare, fit.spare):
+        if not contact.present:
+            return contact, NO_CONTACT
+        self._noise = noise = float(fit.noise) * min(math.sqrt(misfit), 1.0)
+        if misfit <= left_by_chance(_LOOKED_AT, contact.spare, fit.spare) and (
+            self._pairs is None or self._pairs.hint(self._one.rest) < _HINT * noise**2
+        ):
             return contact, NO_CONTACT
         single = misfit <= left_by_chance(_MISFIT, contact.spare, fit.spare)
         contact = replace(contact, single=single)
         with np.errstate(all="ignore"):
-            readings = curvature.ravel() / float(fit.noise)
+            readings = curvature.ravel() / noise
             if self._scale is not None:
                 readings *= self._scale
             if self._pairs is None or not np.nanmax(np.abs(readings)) < _LOUDEST:
                 return contact, NO_CONTACT
-        return self._pairs(readings, fit, contact)
+        return self._pairs(readings, fit, contact, noise)
 
 
 def as_one(first: Contact, second: Contact) -> Contact:
@@ -271,34 +277,55 @@ class _Pairs:
         self._places = places[self.patch.moves(places)]
         self._felt = self._basis.at(self._places)
         self._M = M * self._loads.influence.unit
+        read = self._felt @ M.T
+        read /= np.linalg.norm(read, axis=1, keepdims=True)
+        self._alone: Single = read.astype(np.float32)
         self._pairs = PatternCache[tuple[Array, Array, Array]]()
         self.left = math.nan
         """Weighted sum of squares that the last two loads leave of readings over their noise."""
 
-    def __call__(self, K: Array, fit: Fit, contact: Contact) -> tuple[Contact, Contact]:
+    def hint(self, rest: Array) -> float:
+        """What another load takes off the sum of squares of the `rest` (C,) at least."""
+        return float(np.square(self._alone @ rest.astype(np.float32)).max())
+
+    def __call__(
+        self, K: Array, fit: Fit, contact: Contact, noise: float
+    ) -> tuple[Contact, Contact]:
         """The contacts for readings `K` (C,) over their noise, by the single one that fits best."""
         used = self._live & np.isfinite(K)
         readings = _Readings(np.where(used, K, 0.0), used)
-        several, unit = self._loads.several, float(fit.noise) * self._loads.influence.unit
+        several, unit = self._loads.several, noise * self._loads.influence.unit
         s = contact.size if self._loads.influence.sized else self._loads.start
         alone = np.array([[*contact.position, s, contact.force / unit]])
-        if self._beside(_tried(several, alone, readings), readings) < _HINT:
+        single = _tried(several, alone, readings)
+        hint, beside = self._beside(single, readings)
+        if hint < _HINT:
             return contact, NO_CONTACT
-        two = self._climbed(several, self._found(readings), readings)
-        spare = int(used.sum()) - two.p.size
-        variance = two.left / spare
-        one = self._climbed(several, alone, readings, two.cost + _DISTINCT * variance)
-        better = one.worse(two, variance)
-        contact = replace(contact, single=contact.single and better < _SPREAD)
-        if better < _DISTINCT or not self._explains(two, spare, fit):
-            return contact, NO_CONTACT
+        starts = [np.vstack([alone, beside]), self._found(readings)]
+        starts.sort(key=lambda each: _tried(several, each, readings).cost)
+        best = 0.0
+        for start in starts if hint > _DISTINCT else starts[:1]:
+            two = self._climbed(several, start, readings)
+            spare = int(used.sum()) - two.p.size
+            variance = two.left / spare
+            one = self._climbed(several, alone, readings, two.cost + _DISTINCT * variance)
+            better = one.worse(two, variance)
+            if better > _DISTINCT and self._explains(two, spare, fit, one.left - two.left):
+                break
+            best = max(best, better)
+        else:
+            return replace(contact, single=contact.single and best < _SPREAD), NO_CONTACT
         if self._is_line(two, variance, readings):
-            return contact, NO_CONTACT
+            return replace(contact, single=False), NO_CONTACT
         self.left = two.left
-        return self._told(two, spare, fit)
+        return self._told(two, spare, fit, noise)
 
-    def _explains(self, two: _Tried, spare: int, fit: Fit) -> bool:
-        """Whether two loads explain the readings, and are clear of one another and of the rim."""
+    def _explains(self, two: _Tried, spare: int, fit: Fit, gain: float) -> bool:
+        """Whether two loads explain the readings, and are clear of one another and of the rim.
+
+        The second takes `gain` off the sum of squares that they leave; a third one would far less.
+        """
+        variance = two.left / spare
         (x, y, s, force), (X, Y, S, other) = two.p.tolist()
         wide = math.sqrt(s) + math.sqrt(S) if self._loads.influence.sized else 0.0
         return (
@@ -307,6 +334,7 @@ class _Pairs:
             and not held_near(self._basis, x, y, _RIM)
             and not held_near(self._basis, X, Y, _RIM)
             and two.left <= spare * left_by_chance(_LEFT, spare, fit.spare)
+            and self.hint(two.rest * np.sqrt(two.weights)) < max(_THIRD * gain, _SPREAD * variance)
         )
 
     def _is_line(self, two: _Tried, variance: float, readings: _Readings) -> bool:
@@ -332,10 +360,10 @@ class _Pairs:
         found = forces[pair, pair[::-1]] / across[first, second]
         return np.column_stack([self._places[pair], [self._loads.start] * 2, found])
 
-    def _beside(self, one: _Tried, readings: _Readings) -> float:
+    def _beside(self, one: _Tried, readings: _Readings) -> tuple[float, Array]:
         """What a second load on the grid takes off -2 ln of the likelihood, in first order.
 
-        The first one gives way to it.
+        The first one gives way to it. And that load (1, 4).
         """
         read = self._pairs(readings.used, self._products)[0]
         Q = np.linalg.qr((one.J * np.sqrt(one.weights)).T)[0]
@@ -343,8 +371,11 @@ class _Pairs:
         norm = np.vecdot(read, read)
         across = norm - np.vecdot(own, own)
         rest = one.rest * np.sqrt(one.weights)
-        gain = (read @ (rest - Q @ (rest @ Q))) ** 2
-        return float(np.max(gain / np.where(across > _COVERED * norm, across, math.inf)))
+        across[across <= _COVERED * norm] = math.inf
+        force = read @ (rest - Q @ (rest @ Q)) / across
+        gain = force**2 * np.minimum(across, norm)
+        best = int(gain.argmax())
+        return float(gain[best]), np.array([[*self._places[best], self._loads.start, force[best]]])
 
     def _products(self, used: Mask) -> tuple[Array, Array, Array]:
         """What the readings `used` (C,) are of a load at each place (G, C); their products (G, G).
@@ -390,9 +421,9 @@ class _Pairs:
                 break
         return best
 
-    def _told(self, two: _Tried, spare: int, fit: Fit) -> tuple[Contact, Contact]:
+    def _told(self, two: _Tried, spare: int, fit: Fit, noise: float) -> tuple[Contact, Contact]:
         """The two loads as contacts, the stronger one first."""
-        noise, unit = float(fit.noise), self._loads.influence.unit
+        unit = self._loads.influence.unit
         variance = two.covariance().diagonal() * (two.left / spare)
         sd = np.sqrt(variance).reshape(2, 4)
         forces, force_sd = two.p[:, 3] * (noise * unit), sd[:, 3] * (noise * unit)
