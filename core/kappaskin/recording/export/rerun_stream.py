@@ -236,7 +236,8 @@ class RrdFile:
     def __init__(self, scratch: Path, request: ExportRequest, info: RecordingInfo) -> None:
         name, finger = info.facts["recording"], request.finger or ""
         self._out = RerunStream("an .rrd file", name, finger, info.json())
-        self._out.stream.save(scratch / request.to.name)
+        self._file = scratch / request.to.name
+        self._out.stream.save(self._file)
         self._began = datetime.fromisoformat(info.facts["began"]).timestamp()
 
     def take(self, frame: ExportedFrame) -> bool:
@@ -247,7 +248,12 @@ class RrdFile:
         return True
 
     def finish(self) -> None:
-        self._out.flush(_PATIENCE)
+        try:
+            self._out.flush(_PATIENCE)
+        except OSError:
+            # Why it cannot write, such as a full disk, Rerun tells its log alone: this is refused too.
+            self._file.with_suffix(".more").write_bytes(bytes(2**20))
+            raise
 
     def close(self) -> None:
         self._out.stream.disconnect()
