@@ -375,7 +375,9 @@ class SerialSource:
                 f"{self.url}: not open after {_SLOW:g} s; unplug it and plug it in again, or check "
                 "the address"
             )
-        if self._interpreter.unusable or now - self._opened < _PATIENCE:
+        # More waits, as after a long computation, and may be as described.
+        behind = now - self._received_at >= _PATIENCE and not self._connection.empty
+        if self._interpreter.unusable or behind or now - self._opened < _PATIENCE:
             return self._interpreter.unusable
         if self._interpreter.known and now - self._good_at < _PATIENCE:
             return ""
