@@ -425,7 +425,7 @@ def test_sync_bytes_are_in_hex():
 
 
 def test_a_description_that_cannot_be_read_is_refused(tmp_path):
-    with pytest.raises(Refusal, match="cannot be read"):
+    with pytest.raises(Refusal, match=r"description \(No such file"):
         load_description(tmp_path / "none.toml")
     (tmp_path / "binary.toml").write_bytes(b"\xff\xfe")
     with pytest.raises(Refusal, match="cannot be read"):
