@@ -240,10 +240,10 @@ def test_a_python_that_is_too_old_is_told_in_a_line_what_to_do(monkeypatch):
 def test_a_long_installation_reports_what_it_does_and_why_it_fails(monkeypatch, capfd):
     start = runpy.run_path(str(ROOT / "packaging" / "start.py"))
     monkeypatch.setitem(start["quietly"].__globals__, "REPORT", 0.1)
-    code = "import time; print('Collecting a\\n', flush=True); time.sleep(2); print('no b'); exit(3)"
+    code = "import time; print('Collecting a\\n', flush=True); time.sleep(2); exit('no b')"
     command = [sys.executable, "-c", code]
 
-    with pytest.raises(start["Stop"], match=r"(?s)Collecting a\nno b\nexit code 3; check"):
+    with pytest.raises(start["Stop"], match=r"(?s)Collecting a\nno b\nexit code 1; check"):
         start["quietly"](command, start["environment"](), "check the network")
     assert "==>   Collecting a\n" in capfd.readouterr().out
 

@@ -417,8 +417,7 @@ class SerialSource:
         return (
             f"{self.url}: {arrived} bytes came but no message of wire version {VERSION} "
             f"{self._rates.tried} it is another kind of device: one that prints numbers needs "
-            "--sensor FILE, its description"
-            + (f", or {others} reads its bytes" if others else "")
+            "--sensor FILE, its description" + (f", or {others} reads its bytes" if others else "")
         )
 
 

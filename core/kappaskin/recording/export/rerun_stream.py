@@ -251,7 +251,7 @@ class RrdFile:
         try:
             self._out.flush(_PATIENCE)
         except OSError:
-            # Why it cannot write, such as a full disk, Rerun tells its log alone: this is refused too.
+            # Rerun tells its log alone why, such as a full disk, which this meets too.
             self._file.with_suffix(".more").write_bytes(bytes(2**20))
             raise
 
