@@ -259,10 +259,12 @@ def _broken_off(out: Path, ended: str) -> int:
 
 
 def _line(status: "Status") -> str:
+    from kappaskin.live import LOST
+
     written = status.recording
     return (
         f"{written.seconds:7.1f} s  {written.size / 1e6:8.1f} MB  {status.rate:6.0f} frames/s  "
-        f"{status.accounting.lost} lost"
+        f"{status.accounting.lost} lost" + "  not connected, retrying" * (status.state == LOST)
     )
 
 
