@@ -84,15 +84,14 @@ def record(
     from kappaskin.estimation import slope_warning
     from kappaskin.live import LOST, Engine
     from kappaskin.pipeline import Setup
-    from kappaskin.recording import ReplayedSource
-    from kappaskin.recording.export.writing import FORMATS
+    from kappaskin.recording import TABLES, ReplayedSource
 
     check_time(seconds, "record")
     if sources and out is None and source is not None:  # the one by place is the file then
         source, out = None, Path(source)
     if out is None:
         raise Refusal("expected a file to record to, such as press.mcap, got none; give it")
-    if out.suffix.lower() in FORMATS:
+    if out.suffix.lower() in TABLES:
         made = f"kappaskin export {out.stem}.mcap --to {out.name}"
         raise Refusal(f"{out}: a recording is an MCAP file; record to {out.stem}.mcap, then {made}")
     fingers = fingers_of(source, sources, sensor)

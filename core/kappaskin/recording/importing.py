@@ -21,10 +21,10 @@ from kappaskin.sources import (
     ClockState,
     Interpreter,
     RecordedClock,
+    fields_of,
     load_description,
     sensor_to_json,
 )
-from kappaskin.sources.lines import fields_of
 from kappaskin.sources.wire import Samples
 
 _EVERY, _THEN = 10_000, 100  # first frames that have a recorded estimate; then one of so many

@@ -2,6 +2,7 @@
 
 import importlib
 import math
+import tempfile
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -252,7 +253,8 @@ class RrdFile:
             self._out.flush(_PATIENCE)
         except OSError:
             # Rerun tells its log alone why, such as a full disk, which this meets too.
-            self._file.with_suffix(".more").write_bytes(bytes(2**20))
+            with tempfile.TemporaryFile(dir=self._file.parent) as file:
+                file.write(bytes(2**20))
             raise
 
     def close(self) -> None:
