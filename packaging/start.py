@@ -50,6 +50,7 @@ VENV, CORE_VENV = ROOT / ".venv", ROOT / ".venv-core"
 STAMP = VENV / "kappaskin-stamp"
 REFUSED = 2
 PATIENCE = 30.0  # s that a process is given to start or to end
+REPORT = 15.0  # s after which a silent command is reported to go on
 
 READING = (
     ("ruff", "check"),
@@ -118,6 +119,7 @@ def app(arguments: list[str], shown: dict[str, str]) -> int:
     """Open the app; on a virtual display for some seconds, leaving a picture."""
     command = [tool("kappaskin"), "app", *arguments]
     if not displayless():
+        say("Opening the app")
         return run(command, shown)
     say("No display here: running on a virtual one for some seconds")
     PICTURE.unlink(missing_ok=True)
@@ -317,7 +319,7 @@ def install(venv: Path, *asked: str, keep: bool, python: str = "") -> None:
         command = [python or base_python(), "-m", "venv", "--clear", str(venv)]
         quietly(command, environment(pip=True), "repair this Python, or start with another")
     say("Updating the packages" if keep else "Installing the packages (minutes, up to 1.5 GB)")
-    command = [tool("python", venv), "-m", "pip", "install", "-q", "-c", str(CONSTRAINTS)]
+    command = [tool("python", venv), "-m", "pip", "install", "-c", str(CONSTRAINTS)]
     command += ["-e", *asked]
     quietly(command, environment(pip=True), "check the network and pip's settings, start again")
 
@@ -427,11 +429,23 @@ def started(
 
 
 def quietly(command: list[str], variables: dict[str, str], mend: str) -> None:
-    """Run a command; show what it printed only where it fails."""
-    with tempfile.TemporaryFile("w+", errors="replace") as output:
-        if code := run(command, variables, output=output):
-            output.seek(0)
-            raise Stop(f"{shlex.join(command)}\n{output.read()}exit code {code}; {mend}")
+    """Run a command; show the last line it printed now and then, and more where it fails."""
+    with tempfile.TemporaryDirectory() as folder:
+        log, code = Path(folder, "log"), None
+        with log.open("w") as output, started(command, variables, output) as child:
+            while code is None:
+                try:
+                    code = child.wait(REPORT)
+                except subprocess.TimeoutExpired:
+                    say(f"  {printed(log, 1):.90}")
+        if code:
+            raise Stop(f"{shlex.join(command)}\n{printed(log, 30)}\nexit code {code}; {mend}")
+
+
+def printed(log: Path, most: int) -> str:
+    """The last lines of a log that are not empty, so many at most."""
+    lines = log.read_text("utf-8", "replace").splitlines()
+    return "\n".join([line.strip() for line in lines if line.strip()][-most:])
 
 
 def end(child: subprocess.Popen[bytes], *, ask: bool = True) -> None:

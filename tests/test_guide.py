@@ -327,6 +327,13 @@ def test_every_page_is_in_the_contents_and_in_one_order() -> None:
     assert sorted(listed) == sorted(page.name for page in PAGES[1:] if page.name != "README.md")
 
 
+def test_the_first_page_lists_all_parts_that_are_installed_by_name() -> None:
+    first = (GUIDE / "start.md").read_text("utf-8")
+    assert set(re.findall(r"^pip install 'kappaskin\[(\w+)\]'", first, re.MULTILINE)) == (
+        _extras() - {"dask"}  # which is cluster
+    )
+
+
 def test_the_page_on_plug_ins_shows_what_the_command_writes(tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     blocks = blocks_of(GUIDE / "plug-ins.md")

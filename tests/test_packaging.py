@@ -237,6 +237,17 @@ def test_a_python_that_is_too_old_is_told_in_a_line_what_to_do(monkeypatch):
             start["set_up"]()
 
 
+def test_a_long_installation_reports_what_it_does_and_why_it_fails(monkeypatch, capfd):
+    start = runpy.run_path(str(ROOT / "packaging" / "start.py"))
+    monkeypatch.setitem(start["quietly"].__globals__, "REPORT", 0.1)
+    code = "import time; print('Collecting a\\n', flush=True); time.sleep(2); exit('no b')"
+    command = [sys.executable, "-c", code]
+
+    with pytest.raises(start["Stop"], match=r"(?s)Collecting a\nno b\nexit code 1; check"):
+        start["quietly"](command, start["environment"](), "check the network")
+    assert "==>   Collecting a\n" in capfd.readouterr().out
+
+
 def test_a_dependency_group_is_read_with_those_that_it_includes():
     group = runpy.run_path(str(ROOT / "packaging" / "start.py"))["group"]
     groups = PROJECT["dependency-groups"]

@@ -92,6 +92,11 @@ def test_without_a_display_the_remedy_is_named() -> None:
     assert "Traceback" not in done.stderr
 
 
+def test_the_help_names_the_sources_of_the_window() -> None:
+    text = run("--help").stdout
+    assert all(source in text for source in ("sim:SCENE", "replay:FILE", "engine:HOST", "a port"))
+
+
 def test_asking_for_help_loads_no_qt() -> None:
     code = "import sys, kappaskin_app.command; print('PySide6' in sys.modules)"
     done = subprocess.run(

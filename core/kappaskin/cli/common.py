@@ -62,13 +62,7 @@ SourceName = Annotated[str, Parameter(allow_leading_hyphen=True, converter=_sour
 
 Sources = Annotated[
     list[str] | None,
-    Parameter(
-        name="--source",
-        negative="",
-        allow_leading_hyphen=True,
-        help="The source of one finger of a hand, as NAME=SOURCE; may be given several times. Or a "
-        "hand: hand:NAME, or the file of its description.",
-    ),
+    Parameter(name="--source", negative="", allow_leading_hyphen=True),
 ]
 """An option for `fingers_of`."""
 

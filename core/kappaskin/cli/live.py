@@ -74,6 +74,8 @@ def publish(
     source
         `sim:`, `sim:SCENE`, `feed:NAME`, or a port or URL for pyserial; of a hand `hand:NAME`, or
         the file of its description.
+    sources
+        The source of one finger of a hand, as NAME=SOURCE; may be given several times.
     udp
         HOST:PORT to send JSON datagrams to; may be given several times.
     cue
@@ -162,6 +164,8 @@ def serve(
     ----------
     source
         `sim:`, `sim:SCENE`, `feed:NAME`, or a port or URL for pyserial.
+    sources
+        The source of one finger of a hand, as NAME=SOURCE; may be given several times.
     listen
         HOST or HOST:PORT of this machine to listen at, 9871 when there is no port: 127.0.0.1 for
         this machine and ssh alone, 0.0.0.0 or :: for all that reach it.

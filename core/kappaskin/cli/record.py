@@ -74,6 +74,8 @@ def record(
         the file of its description.
     out
         The file; it must not exist yet.
+    sources
+        The source of one finger of a hand, as NAME=SOURCE; may be given several times.
     seconds
         How long to record, from the first frame computed.
     trust
@@ -82,13 +84,16 @@ def record(
     from kappaskin.estimation import slope_warning
     from kappaskin.live import LOST, Engine
     from kappaskin.pipeline import Setup
-    from kappaskin.recording import ReplayedSource
+    from kappaskin.recording import TABLES, ReplayedSource
 
     check_time(seconds, "record")
     if sources and out is None and source is not None:  # the one by place is the file then
         source, out = None, Path(source)
     if out is None:
         raise Refusal("expected a file to record to, such as press.mcap, got none; give it")
+    if out.suffix.lower() in TABLES:
+        made = f"kappaskin export {out.stem}.mcap --to {out.name}"
+        raise Refusal(f"{out}: a recording is an MCAP file; record to {out.stem}.mcap, then {made}")
     fingers = fingers_of(source, sources, sensor)
     for source in fingers.values():
         if source.startswith(ReplayedSource.SCHEME):
@@ -114,7 +119,7 @@ def record(
         return _broken_off(out, why)
     written = status.recording
     show(
-        f"{written.path}: {written.messages:,} messages in {written.seconds:.1f} s, "
+        f"{written.path or out}: {written.messages:,} messages in {written.seconds:.1f} s, "
         f"{written.size / 1e6:.1f} MB; {status.accounting.words}"
     )
     if written.lost:
@@ -253,10 +258,12 @@ def _broken_off(out: Path, ended: str) -> int:
 
 
 def _line(status: "Status") -> str:
+    from kappaskin.live import LOST
+
     written = status.recording
     return (
         f"{written.seconds:7.1f} s  {written.size / 1e6:8.1f} MB  {status.rate:6.0f} frames/s  "
-        f"{status.accounting.lost} lost"
+        f"{status.accounting.lost} lost" + "  not connected, retrying" * (status.state == LOST)
     )
 
 

@@ -117,7 +117,9 @@ def _read(path: Path) -> tuple[dict[str, Array], dict[str, NDArray[np.str_]]]:
     except Refusal:
         raise
     except ARCHIVE_DAMAGES as error:
-        raise Refusal(f"{path}: cannot be read as NPZ ({error}); expected {_NEEDED}") from error
+        # NumPy takes any other file for pickled objects, and advises to load them unsafely.
+        why = "not an archive of numbers" if "allow_pickle" in str(error) else error
+        raise Refusal(f"{path}: cannot be read as NPZ ({why}); expected {_NEEDED}") from error
     needed = ("values", "element", "quantity") if "values" in found else ("curvature",)
     needed = "positions", *needed
     if "mesh" not in found:

@@ -21,6 +21,7 @@ from kappaskin.sources import (
     ClockState,
     Interpreter,
     RecordedClock,
+    fields_of,
     load_description,
     sensor_to_json,
 )
@@ -34,8 +35,6 @@ _DATES = 1e9, 2.0**31 - 1  # s: from 2001 to 2038 they are since 1970, else sinc
 _JUMP = 1e9  # s between two records, which is none of a clock that goes on
 _SHOWN = 60  # characters of a bad row
 _ELSEWHERE = "free space, or choose another folder"
-_COMMA = re.compile(rb"\d,\d+\s*[;\t]")
-_SEPARATORS = (b";", b"\t", b",")
 _NAME = re.compile(rb"(?i)(?!nan$|inf$|infinity$)[a-z_\x80-\xff]")
 
 
@@ -179,7 +178,7 @@ class _Import:
         text = line.strip()
         found = not text or text.startswith((b"#", b"%", b"//")) or text == self._heading
         if not found and not (self._frames or self._heading):
-            fields = [field.strip(b' "') for field in _fields(text)]
+            fields = [field.strip(b' "') for field in fields_of(text)]
             counted = [b"%d" % n for n in range(len(fields))]
             found = fields in (counted, [b"", *counted[:-1]]) or any(map(_NAME.match, fields))
             self._heading = text if found else b""
@@ -197,7 +196,7 @@ class _Import:
             self._discard("duplicate", "")
         elif last and not samples:
             reason, _, first = last.partition(": ")
-            self._discard(reason, first, data)
+            self._discard(reason, first)
         if self._recorder and len(self._pending) > _HELD:
             self._record(self._recorder)
 
@@ -209,13 +208,8 @@ class _Import:
         if not recorder.written.active:
             raise Refusal(recorder.written.trouble)
 
-    def _discard(self, reason: str, first: str, data: bytes = b"") -> None:
+    def _discard(self, reason: str, first: str) -> None:
         if reason not in self._bad:
-            fields = len(_fields(data.strip())) if self.description.kind == "text" else 0
-            if _COMMA.search(data):
-                first += " (numbers have a decimal point, not a comma)"
-            elif data and fields not in (0, len(self.description.columns)):
-                first += f" ({fields} fields)"
             self._first[reason] = self.rows, first
         self._bad[reason] += 1
 
@@ -327,11 +321,6 @@ class _Import:
             self._decoder.accounting().lost,
             tuple(BadRows(reason, n, *self._first[reason]) for reason, n in self._bad.items()),
         )
-
-
-def _fields(line: bytes) -> list[bytes]:
-    """The fields of a line, whichever separator it has."""
-    return line.split(next((separator for separator in _SEPARATORS if separator in line), None))
 
 
 class ImportTask(ScratchTask[Imported]):

@@ -22,6 +22,7 @@ from kappaskin.sources.inputs import EndOfInput as EndOfInput
 from kappaskin.sources.inputs import Input as Input
 from kappaskin.sources.interpreter import Interpreter as Interpreter
 from kappaskin.sources.lines import LineDecoder as LineDecoder
+from kappaskin.sources.lines import fields_of as fields_of
 from kappaskin.sources.ports import BAUD_RATES as BAUD_RATES
 from kappaskin.sources.ports import Port as Port
 from kappaskin.sources.ports import SerialConnection as SerialConnection

@@ -248,7 +248,8 @@ def load_description(file: Path, serial_number: str = "") -> Description:
     try:
         text = read_file(file, _LARGEST).decode("utf-8-sig")
     except (OSError, ValueError) as error:
-        raise Refusal(f"{file}: cannot be read as a sensor's description ({error})") from error
+        why = getattr(error, "strerror", None) or error
+        raise Refusal(f"{file}: cannot be read as a sensor's description ({why})") from error
     text = _with_files(_with_calibration(text.replace("\r\n", "\n"), file), file)
     return description_of(text, str(file), serial_number)
 

@@ -29,6 +29,7 @@ SEPARATORS = (",", ";", "\t", " ")
 
 _LONGEST, _NUMBER = 2**16, 32  # bytes of a line, and for each number where there are many
 _SHOWN = 60  # characters of a line that was discarded
+_COMMA = re.compile(rb"\d,\d+\s*[;\t]")
 
 
 @dataclass(frozen=True, eq=False)
@@ -242,6 +243,16 @@ class TextDecoder(_Lines):
         except ValueError:
             return "no number"
 
+    def _discard(self, reason: str, data: bytes, tell: bool = True) -> None:
+        super()._discard(reason, data, tell)
+        if not (tell and data):
+            return
+        fields, expected = len(fields_of(data.strip())), len(self._columns)
+        if _COMMA.search(data):
+            self.last += " (numbers have a decimal point, not a comma)"
+        elif fields != expected:
+            self.last += f" ({fields} fields, expected {expected})"
+
     def encoded(self, sequence: int, time: float, readings: Array) -> bytes:
         numbers = self._columns.numbers(sequence, time, readings)
         separator = self._separator or SEPARATORS[0]
@@ -262,6 +273,11 @@ class TextDecoder(_Lines):
 def _split(text: bytes, separator: str) -> list[bytes]:
     """The parts of a line; any number of spaces and tabs is one space."""
     return text.split() if separator == " " else text.split(separator.encode())
+
+
+def fields_of(line: bytes) -> list[bytes]:
+    """The fields of a line, whichever separator it has."""
+    return line.split(next((each for each in (b";", b"\t", b",") if each in line), None))
 
 
 def _is_number_or_missing(part: bytes) -> bool:

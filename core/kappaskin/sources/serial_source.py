@@ -375,7 +375,9 @@ class SerialSource:
                 f"{self.url}: not open after {_SLOW:g} s; unplug it and plug it in again, or check "
                 "the address"
             )
-        if self._interpreter.unusable or now - self._opened < _PATIENCE:
+        # More waits, as after a long computation, and may be as described.
+        behind = now - self._received_at >= _PATIENCE and not self._connection.empty
+        if self._interpreter.unusable or behind or now - self._opened < _PATIENCE:
             return self._interpreter.unusable
         if self._interpreter.known and now - self._good_at < _PATIENCE:
             return ""
@@ -414,8 +416,8 @@ class SerialSource:
         others = ", ".join(self._holders)
         return (
             f"{self.url}: {arrived} bytes came but no message of wire version {VERSION} "
-            f"{self._rates.tried} it is another kind of device"
-            + (f", or {others} reads its bytes" if others else "")
+            f"{self._rates.tried} it is another kind of device: one that prints numbers needs "
+            "--sensor FILE, its description" + (f", or {others} reads its bytes" if others else "")
         )
 
 

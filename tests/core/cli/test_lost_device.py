@@ -9,6 +9,7 @@ import pytest
 
 from kappaskin import load_scene
 from kappaskin.cli import main
+from kappaskin.cli.common import ProgressLine
 from kappaskin.recording import Recording
 
 pytest.importorskip("pty", reason="no pseudo-terminals on this system")
@@ -44,6 +45,14 @@ def port(tmp_path_factory) -> Iterator[str]:
     yield str(link)
     over.set()
     thread.join()
+
+
+def test_a_recording_shows_at_once_that_its_device_is_gone(port, tmp_path, monkeypatch) -> None:
+    lines = list[str]()
+    monkeypatch.setattr(ProgressLine, "__call__", lambda _, line: lines.append(line))
+    assert main(["record", port, str(tmp_path / "x.mcap"), "--seconds", "3"]) == 1
+    assert "not connected" not in lines[0]
+    assert lines[-1].endswith("0 lost  not connected, retrying")
 
 
 @pytest.mark.cases("record", "tare")

@@ -143,6 +143,13 @@ def test_what_cannot_be_recorded_leaves_nothing(source, seconds, why, tmp_path, 
     assert os.listdir(tmp_path) == []
 
 
+def test_a_recording_is_not_named_as_a_table(tmp_path, capsys) -> None:
+    assert main(["record", "sim:", str(tmp_path / "a.csv"), "--seconds", "1"]) == 2
+    remedy = "record to a.mcap, then kappaskin export a.mcap --to a.csv"
+    assert remedy in capsys.readouterr().err
+    assert os.listdir(tmp_path) == []
+
+
 def test_no_file_is_written_over(tmp_path, capsys) -> None:
     out = tmp_path / "a.mcap"
     out.write_bytes(b"mine")

@@ -555,10 +555,10 @@ def test_a_file_that_appears_meanwhile_stays_as_it_is(taps, tmp_path) -> None:
         ),
         ("out.lerobot", {"every": 3.0}, "a whole number of rows a second"),
         ("out.lerobot", {"every": 1e-320}, "a whole number of rows a second"),
-        ("out.vtp", {}, "give it"),
+        ("out.vtp", {}, r"\(at, in s\), .* \(every, in s\)"),
         ("out.vtp", {"every": 0.1}, "to a .pvd"),
-        ("out.pvd", {}, "between two surfaces"),
-        ("out.stl", {}, "at one moment"),
+        ("out.pvd", {}, r"two surfaces \(every, in s\)"),
+        ("out.stl", {}, r"at one moment, .* \(at, in s\)"),
         ("out.stl", {"at": 0.1, "every": 0.1}, "got both"),
         ("out.csv", {"begin": math.nan}, "times in s"),
         ("out.csv", {"begin": -1.0}, "times in s"),
@@ -654,6 +654,7 @@ def test_a_full_disk_is_told_of(taps, tmp_path) -> None:
     )
     suffixes = (".csv", ".npz", ".h5", ".vtp", ".stl")
     suffixes += (".parquet", ".lerobot") * bool(find_spec("pyarrow"))
+    suffixes += (".rrd",) * bool(find_spec("rerun"))
     places = [tmp_path / f"out{suffix}" for suffix in suffixes]
     command = [sys.executable, "-c", script, *map(str, [taps[0], *places])]
     # What coverage measures would find no room either.
@@ -663,7 +664,9 @@ def test_a_full_disk_is_told_of(taps, tmp_path) -> None:
     )
     why = "cannot be written (File too large); choose another place"
     assert found.stdout.splitlines() == [f"{place}: {why}" for place in places], found.stderr
-    assert (found.returncode, found.stderr) == (0, "")
+    # Rerun's own log, of its modules re_..., goes there too.
+    errors = [line for line in found.stderr.splitlines() if "re_" not in line]
+    assert (found.returncode, errors) == (0, [])
 
 
 @pytest.mark.parametrize(

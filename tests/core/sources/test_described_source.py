@@ -20,7 +20,13 @@ from kappaskin.live.pipelines import NoiseCheck
 from kappaskin.recording import Verification
 from kappaskin.sensing import SensorLayout
 from kappaskin.skin import Patch
-from kappaskin.sources import PseudoDevice, described_source, load_description, open_source
+from kappaskin.sources import (
+    PseudoDevice,
+    SerialSource,
+    described_source,
+    load_description,
+    open_source,
+)
 from kappaskin.sources.description import description_of
 
 pytestmark = [
@@ -181,6 +187,26 @@ def test_an_unplugged_board_is_back_when_it_is_plugged_in(tmp_path):
     assert len(found) == 2
     assert {"met", "gone", "back"} <= set(events)
     assert source.accounting().balanced
+
+
+def test_a_board_is_not_silent_while_what_it_sent_waits(tmp_path):
+    now, (master, slave) = [100.0], os.openpty()
+    tty.setraw(slave)
+    description = load_description(written(tmp_path, "text"))
+    line = description.decoder().encoded(0, 1.0, np.zeros(108))
+    port = os.ttyname(slave)
+    with closing(SerialSource(port, lambda: now[0], description=description)) as source:
+        for _ in range(600):  # 130 KB, twice as much as is read at once
+            os.write(master, line)
+        now[0] = 104.0  # after a computation
+        assert source.read(0.1)
+        assert source.trouble == ""
+        while source.read(0.1):
+            pass
+        now[0] = 108.0
+        assert "silent for more than 3 s" in source.trouble
+    os.close(master)
+    os.close(slave)
 
 
 def test_a_scene_on_another_skin_is_refused(tmp_path):

@@ -424,8 +424,16 @@ def test_sync_bytes_are_in_hex():
         described(BINARY.replace("aa55", "xy"))
 
 
+def test_a_line_of_other_columns_is_told_by_their_number():
+    found = decoder()
+    assert not found.feed(LINE.replace(b"1500", b"1500,3"))
+    assert found.last.endswith("12,-2' (10 fields, expected 9)")
+    found.feed(LINE.replace(b",", b";").replace(b"2;", b"2,5;"))
+    assert found.last.endswith("(numbers have a decimal point, not a comma)")
+
+
 def test_a_description_that_cannot_be_read_is_refused(tmp_path):
-    with pytest.raises(Refusal, match="cannot be read"):
+    with pytest.raises(Refusal, match=r"description \(No such file"):
         load_description(tmp_path / "none.toml")
     (tmp_path / "binary.toml").write_bytes(b"\xff\xfe")
     with pytest.raises(Refusal, match="cannot be read"):

@@ -322,6 +322,7 @@ def test_another_protocol_is_told_apart(line, opened, hasty) -> None:
     assert frames == []
     assert "260 bytes came but no message of wire version 1" in why
     assert "at 2000000 baud; other rates are tried as bytes arrive, or it is another kind" in why
+    assert "one that prints numbers needs --sensor FILE" in why
 
 
 def test_another_version_is_told_apart(line, opened, hasty) -> None:

@@ -145,15 +145,17 @@ class ExportRequest:
             )
         if self.format == ".vtp" and self.at is None:
             raise Refusal(
-                "a .vtp is the skin at one moment: give it, or export a series to a .pvd, with "
-                "the time between two surfaces"
+                "a .vtp is the skin at one moment: give it (at, in s), or export a series to a "
+                ".pvd, with the time between two surfaces (every, in s)"
             )
         if self.format == ".pvd" and not self.every:
-            raise Refusal("a .pvd is a series of surfaces: give the time between two surfaces")
+            raise Refusal(
+                "a .pvd is a series of surfaces: give the time between two surfaces (every, in s)"
+            )
         if self.format == ".stl" and self.at is None and not self.every:
             raise Refusal(
-                "an .stl is the skin at one moment, or a series: give the moment, or the time "
-                "between two surfaces"
+                "an .stl is the skin at one moment, or a series: give the moment (at, in s), or "
+                "the time between two surfaces (every, in s)"
             )
 
     def _check_place(self) -> None:

@@ -2,6 +2,7 @@
 
 import importlib
 import math
+import tempfile
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -229,7 +230,8 @@ class RrdFile:
     def __init__(self, scratch: Path, request: ExportRequest, info: RecordingInfo) -> None:
         name, finger = info.facts["recording"], request.finger or ""
         self._out = RerunStream("an .rrd file", name, finger, info.json())
-        self._out.stream.save(scratch / request.to.name)
+        self._file = scratch / request.to.name
+        self._out.stream.save(self._file)
         self._began = datetime.fromisoformat(info.facts["began"]).timestamp()
 
     def take(self, frame: ExportedFrame) -> bool:
@@ -240,7 +242,13 @@ class RrdFile:
         return True
 
     def finish(self) -> None:
-        self._out.flush(_PATIENCE)
+        try:
+            self._out.flush(_PATIENCE)
+        except OSError:
+            # Rerun tells its log alone why, such as a full disk, which this meets too.
+            with tempfile.TemporaryFile(dir=self._file.parent) as file:
+                file.write(bytes(2**20))
+            raise
 
     def close(self) -> None:
         self._out.stream.disconnect()
