@@ -98,7 +98,7 @@ class Contacts:
             return contact, NO_CONTACT
         self._noise = noise = float(fit.noise) * min(math.sqrt(misfit), 1.0)
         if misfit <= left_by_chance(_LOOKED_AT, contact.spare, fit.spare) and (
-            self._pairs is None or self._pairs.hint(self._one.rest) < _HINT * noise**2
+            self._pairs is None or self._pairs.hint(self._one.rest / (noise or 1.0)) < _HINT
         ):
             return contact, NO_CONTACT
         single = misfit <= left_by_chance(_MISFIT, contact.spare, fit.spare)
