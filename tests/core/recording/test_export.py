@@ -793,16 +793,22 @@ STATE = {
 def read_lerobot(folder: Path) -> tuple[dict[str, np.ndarray], dict, dict]:
     """Columns of the episode, `info.json` and statistics, checked against each other."""
     parquet, arrow = pytest.importorskip("pyarrow.parquet"), pytest.importorskip("pyarrow")
-    meta = {path.name: path.read_text() for path in (folder / "meta").iterdir()}
-    info, task, episode, statistics = (
-        json.loads(meta[name], parse_constant=pytest.fail)  # NaN is no JSON
-        for name in ("info.json", "tasks.jsonl", "episodes.jsonl", "episodes_stats.jsonl")
+    info, statistics = (
+        json.loads((folder / "meta" / name).read_text(), parse_constant=pytest.fail)  # NaN: no JSON
+        for name in ("info.json", "stats.json")
     )
-    assert info["codebase_version"] == "v2.1"
-    files = [folder / info["data_path"].format(episode_chunk=0, episode_index=0)]
-    assert list(folder.rglob("*.parquet")) == files
+    assert info["codebase_version"] == "v3.0"
+    first = {"chunk_index": 0, "file_index": 0}
+    files = [folder / info["data_path"].format(**first)]
+    assert list((folder / "data").rglob("*.parquet")) == files
+    tasks = parquet.read_table(folder / "meta" / "tasks.parquet")
+    assert json.loads(tasks.schema.metadata[b"pandas"])["index_columns"] == ["task"]
+    (task,) = tasks.to_pylist()
+    episodes = list((folder / "meta" / "episodes").rglob("*.parquet"))
+    assert [path.name for path in episodes] == ["file-000.parquet"]
+    (episode,) = parquet.read_table(episodes[0]).to_pylist()
     table = parquet.read_table(files[0])
-    assert table.column_names == [*info["features"]] == [*statistics["stats"]]
+    assert table.column_names == [*info["features"]] == [*statistics]
     found = {}
     for name, feature in info["features"].items():
         (count,) = feature["shape"]
@@ -810,20 +816,26 @@ def read_lerobot(folder: Path) -> tuple[dict[str, np.ndarray], dict, dict]:
         assert table.schema.field(name).type == (kind if count == 1 else arrow.list_(kind, count))
         assert feature["names"] is None or len(feature["names"]) == count
         found[name] = each = np.array(table[name].to_pylist()).reshape(-1, count)
-        said = statistics["stats"][name]
+        said = statistics[name]
+        assert {key: episode.pop(f"stats/{name}/{key}") for key in said} == said
         for what in ("min", "max", "mean", "std"):
             of = getattr(each.astype(float), what)(axis=0)
             np.testing.assert_allclose(said[what], of, rtol=1e-9, atol=1e-12)
         assert said["count"] == [table.num_rows]
     rows = np.arange(info["total_frames"])[:, None]
-    assert episode == {"episode_index": 0, "tasks": [task["task"]], "length": table.num_rows}
+    count = table.num_rows
+    assert episode == {
+        **{"episode_index": 0, "tasks": [task["task"]], "length": count},
+        **{"dataset_from_index": 0, "dataset_to_index": count},
+        **{f"{of}/{name}": n for of in ("data", "meta/episodes") for name, n in first.items()},
+    }
     assert (info["total_episodes"], info["total_tasks"], task["task_index"]) == (1, 1, 0)
     for name in ("frame_index", "index"):
         np.testing.assert_array_equal(found[name], rows)
     assert not found["episode_index"].any()
     assert not found["task_index"].any()
     np.testing.assert_allclose(found["timestamp"], rows / info["fps"], rtol=1e-6)
-    return found, info, statistics["stats"]
+    return found, info, statistics
 
 
 @pytest.mark.parametrize(
