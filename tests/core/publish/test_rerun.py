@@ -237,6 +237,25 @@ def test_a_finger_has_its_name_before_its_entities(tmp_path) -> None:
     assert all(name.startswith("/thumb/") for name in entities)
 
 
+def test_an_element_that_is_not_known_has_the_colour_of_zero(tmp_path) -> None:
+    out = RerunStream("a test", "")
+    out.stream.save(tmp_path / "out.rrd")
+    pipeline = Pipeline(TAPS.sensor(), Setup(Ni=6, Nj=6))
+    estimate = pipeline(Simulator(TAPS).frame(0, time.monotonic))
+    curvature = estimate.curvature.copy()
+    curvature[0, 3] = np.nan
+    out.take(1e9, Reported(replace(estimate, curvature=curvature), pipeline.fitted), pipeline)
+    out.flush(10)
+    out.stream.disconnect()
+    read = Read(tmp_path / "out.rrd")
+    (tensor,) = read.always("/readings/xx", "Tensor:data")
+    np.testing.assert_array_equal(
+        np.array(tensor["buffer"], "<f4"), np.nan_to_num(curvature[0]).astype("<f4")
+    )
+    low, high = read.always("/readings/xx", "Tensor:value_range")[0]
+    assert high == -low == np.nanmax(np.abs(curvature[0]))
+
+
 def test_without_its_package_what_installs_it_is_said(monkeypatch) -> None:
     monkeypatch.setitem(sys.modules, "rerun", None)
     with pytest.raises(Refusal, match=r"needs rerun: pip install 'kappaskin\[rerun\]'"):

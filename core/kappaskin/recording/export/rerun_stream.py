@@ -250,8 +250,12 @@ class _Skin:
         return self._largest[kind]
 
     def image(self, values: Array) -> "np.ndarray[Any, np.dtype[np.float32]]":
-        """Values (P,) of the elements along y and x, both upward; NaN off the skin."""
-        return np.where(self._off, np.nan, values[self._element]).astype(np.float32)
+        """Values (P,) of the elements along y and x, both upward; 0 off the skin or not known.
+
+        A viewer of tensors draws NaN as the least value.
+        """
+        found = np.where(self._off, 0.0, values[self._element])
+        return np.nan_to_num(found).astype(np.float32)
 
 
 _PATIENCE = 60.0  # s until all is on the disk
