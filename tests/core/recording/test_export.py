@@ -651,7 +651,7 @@ def test_a_recording_that_is_none_is_refused(tmp_path) -> None:
 
 def test_a_recording_without_settings_is_refused(tmp_path) -> None:
     recorded(tmp_path / "rec.mcap", steps=())
-    with pytest.raises(Refusal, match="without settings"):
+    with pytest.raises(Refusal, match="without settings, so no frame was computed; record for lon"):
         export(tmp_path / "rec.mcap", tmp_path / "out.csv")
 
 
