@@ -437,7 +437,7 @@ def export(
     A .vtp or .stl is the skin in space at one moment, a .pvd a series of .vtp files. A .glb (glTF)
     is the skin at one moment, as it moves with the time between two shapes, or at its deepest. A
     .rrd has all that Rerun shows: the skin, the contact, readings and numbers over time. A .lerobot
-    is a folder in the form of LeRobot 2.1: contact and readings at a regular rate, as one episode.
+    is a folder in the form of LeRobot 3.0: contact and readings at a regular rate, as one episode.
     Every file states units, settings, calibration, tare and device. Of a hand each finger has a
     file of its own, named as TO and the finger: press-thumb.csv; exit code 1 if there is none of
     one of them.

@@ -402,13 +402,18 @@ def test_layouts_for_viewers_name_what_is_sent(message) -> None:
     sent = json.loads(message.contact)
     layout = json.loads((PUBLISHING / "foxglove-layout.json").read_text())
     panels = layout["configById"]
+    titles = {"foxglovePanelTitle", "lichtblickPanelTitle"}  # as each viewer calls it
+    assert all(titles <= {*panel} for name, panel in panels.items() if name != "RosOut!log")
     places = re.findall(r"[\w]+![\w]+", json.dumps(layout["layout"]))
     assert sorted(places) == sorted(panels)
     topics = [*panels["3D!skin"]["topics"], panels["RosOut!log"]["topicToRender"]]
     assert set(topics) <= set(TOPICS)
     plotted = [path["value"] for panel in panels.values() for path in panel.get("paths", [])]
-    assert len(plotted) == 6
+    assert len(plotted) == 4
     tree = ElementTree.fromstring((PUBLISHING / "plotjuggler-layout.xml").read_text())
+    assert [each.attrib for each in tree.iter("previouslyLoaded_Streamer")] == [
+        {"name": "UDP Server"}
+    ]
     curves = [f"/contact.{each.attrib['name'][1:]}" for each in tree.iter("curve")]
     assert len(curves) == 10
     for name in plotted + curves:

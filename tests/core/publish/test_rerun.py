@@ -133,18 +133,23 @@ def test_the_skin_is_drawn_where_the_fit_has_it(taps) -> None:
     assert len(read.rows("/skin", "Mesh3D:vertex_colors")[at]) == len(want)
 
 
-def test_readings_are_images_with_y_upward(taps) -> None:
+def test_readings_are_tensors_along_y_and_x_whose_colours_are_of_one_range(taps) -> None:
     _, told, read = taps
     layout, first = told[0][2].sensor.layout, told[0][1].estimate
     for row, name in enumerate(("xx", "yy", "xy")):
-        data = next(iter(read.rows(f"/readings/{name}", "Image:buffer").values()))
-        form = next(iter(read.rows(f"/readings/{name}", "Image:format").values()))[0]
-        image = np.array(data, np.uint8).view("<f4").reshape(form["height"], form["width"])
-        assert image.size == len(layout)
+        (tensor,) = next(iter(read.rows(f"/readings/{name}", "Tensor:data").values()))
+        height, width = tensor["shape"]
+        values = np.array(tensor["buffer"], "<f4").reshape(height, width)
+        assert values.size == len(layout)
         for value, (x, y) in zip(first.curvature[row], layout.positions, strict=True):
-            column = int(x / layout.patch.a * form["width"])
-            line = form["height"] - 1 - int(y / layout.patch.b * form["height"])
-            assert image[line, column] == np.float32(value)
+            place = int(y / layout.patch.b * height), int(x / layout.patch.a * width)
+            assert values[place] == np.float32(value)
+        ranges = [each[0] for each in read.rows(f"/readings/{name}", "Tensor:value_range").values()]
+        ends = np.array(ranges)[:, 1]
+        np.testing.assert_array_equal(ranges, np.column_stack([-ends, ends]))
+        assert (np.diff(ends) >= 0).all()  # of the largest so far
+        largest = max(np.abs(each.estimate.curvature[row]).max() for _, each, _ in told)
+        assert np.abs(first.curvature[row]).max() <= ends[-1] * (1 + 1e-12) <= largest * (1 + 1e-9)
 
 
 def test_the_contact_has_its_frame_and_its_error_bars(taps) -> None:
@@ -230,6 +235,25 @@ def test_a_finger_has_its_name_before_its_entities(tmp_path) -> None:
     out.stream.disconnect()
     entities = set(Read(tmp_path / "hand.rrd").batches) - {"/", "/__properties"}
     assert all(name.startswith("/thumb/") for name in entities)
+
+
+def test_an_element_that_is_not_known_has_the_colour_of_zero(tmp_path) -> None:
+    out = RerunStream("a test", "")
+    out.stream.save(tmp_path / "out.rrd")
+    pipeline = Pipeline(TAPS.sensor(), Setup(Ni=6, Nj=6))
+    estimate = pipeline(Simulator(TAPS).frame(0, time.monotonic))
+    curvature = estimate.curvature.copy()
+    curvature[0, 3] = np.nan
+    out.take(1e9, Reported(replace(estimate, curvature=curvature), pipeline.fitted), pipeline)
+    out.flush(10)
+    out.stream.disconnect()
+    read = Read(tmp_path / "out.rrd")
+    (tensor,) = read.always("/readings/xx", "Tensor:data")
+    np.testing.assert_array_equal(
+        np.array(tensor["buffer"], "<f4"), np.nan_to_num(curvature[0]).astype("<f4")
+    )
+    low, high = read.always("/readings/xx", "Tensor:value_range")[0]
+    assert high == -low == np.nanmax(np.abs(curvature[0]))
 
 
 def test_without_its_package_what_installs_it_is_said(monkeypatch) -> None:

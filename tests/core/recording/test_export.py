@@ -139,7 +139,7 @@ def columns_in(path: Path) -> dict[str, np.ndarray]:
         with np.load(path) as arrays:
             return {name: arrays[name] for name in arrays.files if name != "about"}
     with h5py.File(path) as file:
-        return {name: file[name][:] for name in file if name not in ("README", "axes")}
+        return {name: each[:] for name, each in file.items() if "description" in each.attrs}
 
 
 @pytest.mark.parametrize("suffix", [".npz", ".h5"])
@@ -247,9 +247,11 @@ def test_an_hdf5_column_has_its_unit(taps, tmp_path) -> None:
         np.testing.assert_array_equal(elements, np.arange(file["curvature"].shape[2]))
         assert file["coefficients"].dims[1].label == "along"
         assert file["force"].attrs["unit"] == "N"
-        assert all(
-            file[name].attrs["description"] for name in file if name not in ("README", "axes")
-        )
+        scales = {scale for each in file.values() for dim in each.dims for scale in dim.values()}
+        assert {scale.parent for scale in scales} == {file}  # where NetCDF looks for them
+        columns = [each for each in file.values() if "unit" in each.attrs]
+        assert len(columns) > 10
+        assert all(each.attrs["description"] for each in columns)
 
 
 def test_settings_that_change_are_told_of_and_each_frame_says_which_it_had(tmp_path) -> None:
@@ -602,7 +604,7 @@ def test_a_recording_that_is_none_is_refused(tmp_path) -> None:
 
 def test_a_recording_without_settings_is_refused(tmp_path) -> None:
     recorded(tmp_path / "rec.mcap", steps=())
-    with pytest.raises(Refusal, match="without settings"):
+    with pytest.raises(Refusal, match="without settings, so no frame was computed; record for lon"):
         export(tmp_path / "rec.mcap", tmp_path / "out.csv")
 
 
@@ -749,16 +751,22 @@ STATE = {
 def read_lerobot(folder: Path) -> tuple[dict[str, np.ndarray], dict, dict]:
     """Columns of the episode, `info.json` and statistics, checked against each other."""
     parquet, arrow = pytest.importorskip("pyarrow.parquet"), pytest.importorskip("pyarrow")
-    meta = {path.name: path.read_text() for path in (folder / "meta").iterdir()}
-    info, task, episode, statistics = (
-        json.loads(meta[name], parse_constant=pytest.fail)  # NaN is no JSON
-        for name in ("info.json", "tasks.jsonl", "episodes.jsonl", "episodes_stats.jsonl")
+    info, statistics = (
+        json.loads((folder / "meta" / name).read_text(), parse_constant=pytest.fail)  # NaN: no JSON
+        for name in ("info.json", "stats.json")
     )
-    assert info["codebase_version"] == "v2.1"
-    files = [folder / info["data_path"].format(episode_chunk=0, episode_index=0)]
-    assert list(folder.rglob("*.parquet")) == files
+    assert info["codebase_version"] == "v3.0"
+    first = {"chunk_index": 0, "file_index": 0}
+    files = [folder / info["data_path"].format(**first)]
+    assert list((folder / "data").rglob("*.parquet")) == files
+    tasks = parquet.read_table(folder / "meta" / "tasks.parquet")
+    assert json.loads(tasks.schema.metadata[b"pandas"])["index_columns"] == ["task"]
+    (task,) = tasks.to_pylist()
+    episodes = list((folder / "meta" / "episodes").rglob("*.parquet"))
+    assert [path.name for path in episodes] == ["file-000.parquet"]
+    (episode,) = parquet.read_table(episodes[0]).to_pylist()
     table = parquet.read_table(files[0])
-    assert table.column_names == [*info["features"]] == [*statistics["stats"]]
+    assert table.column_names == [*info["features"]] == [*statistics]
     found = {}
     for name, feature in info["features"].items():
         (count,) = feature["shape"]
@@ -766,20 +774,26 @@ def read_lerobot(folder: Path) -> tuple[dict[str, np.ndarray], dict, dict]:
         assert table.schema.field(name).type == (kind if count == 1 else arrow.list_(kind, count))
         assert feature["names"] is None or len(feature["names"]) == count
         found[name] = each = np.array(table[name].to_pylist()).reshape(-1, count)
-        said = statistics["stats"][name]
+        said = statistics[name]
+        assert {key: episode.pop(f"stats/{name}/{key}") for key in said} == said
         for what in ("min", "max", "mean", "std"):
             of = getattr(each.astype(float), what)(axis=0)
             np.testing.assert_allclose(said[what], of, rtol=1e-9, atol=1e-12)
         assert said["count"] == [table.num_rows]
     rows = np.arange(info["total_frames"])[:, None]
-    assert episode == {"episode_index": 0, "tasks": [task["task"]], "length": table.num_rows}
+    count = table.num_rows
+    assert episode == {
+        **{"episode_index": 0, "tasks": [task["task"]], "length": count},
+        **{"dataset_from_index": 0, "dataset_to_index": count},
+        **{f"{of}/{name}": n for of in ("data", "meta/episodes") for name, n in first.items()},
+    }
     assert (info["total_episodes"], info["total_tasks"], task["task_index"]) == (1, 1, 0)
     for name in ("frame_index", "index"):
         np.testing.assert_array_equal(found[name], rows)
     assert not found["episode_index"].any()
     assert not found["task_index"].any()
     np.testing.assert_allclose(found["timestamp"], rows / info["fps"], rtol=1e-6)
-    return found, info, statistics["stats"]
+    return found, info, statistics
 
 
 @pytest.mark.parametrize(

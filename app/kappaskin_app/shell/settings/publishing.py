@@ -68,7 +68,7 @@ class PublishSettings:
         False,
         Switch(
             "Rerun",
-            "Send the viewer of Rerun the skin, the contact, images of the readings and all "
+            "Send the viewer of Rerun the skin, the contact, maps of the readings and all "
             "numbers over time. Start the viewer with the command rerun; it may start later.",
         ),
     )

@@ -1,4 +1,4 @@
-"""Exported data sets in the form of LeRobot 2.1: a folder of Parquet and JSON files."""
+"""Exported data sets in the form of LeRobot 3.0: a folder of Parquet and JSON files."""
 
 import importlib
 import json
@@ -14,7 +14,11 @@ from kappaskin.recording.export.tables import Block, Column, TableWriter
 _WINDOW = 100  # frames that a rate is taken over: they may come in bursts
 _EARLY = 1e-6  # share of a period by which a frame may come late: times are rounded
 _READINGS = ("curvature", "reading")
-_DATA = "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet"
+_FILE = "{}/chunk-{{chunk_index:03d}}/file-{{file_index:03d}}.parquet"
+_DATA, _EPISODES = _FILE.format("data"), _FILE.format("meta/episodes")
+_FIRST = {"chunk_index": 0, "file_index": 0}
+_TASK = {"name": "task", "field_name": "task", "pandas_type": "unicode", "numpy_type": "object"}
+_BY_TASK = {"index_columns": ["task"], "columns": [_TASK], "column_indexes": []}  # for Pandas
 _RESAMPLED = (
     "Rows are 1 / fps apart, from the first frame on. Each has the newest frame that had arrived "
     "by then: frames may be skipped, or repeated, as where the connection was lost. recorded_time "
@@ -34,7 +38,7 @@ class LeRobotFolder(TableWriter):
 
     def begin(self, scratch: Path) -> None:
         self._arrow = optional("pyarrow", "parquet", "a .lerobot folder")
-        parquet: Any = importlib.import_module("pyarrow.parquet")
+        self._parquet: Any = importlib.import_module("pyarrow.parquet")
         readings = [column for column in self.columns if column.name in _READINGS]
         state = [column for column in self.columns if column.name not in ("time", *_READINGS)]
         self._groups = {"state": state, "readings": readings}
@@ -51,14 +55,14 @@ class LeRobotFolder(TableWriter):
         self._fps, self._start, self._length = round(1 / (self.request.every or 1)), 0.0, 0
         self._last: Block = {}
         self._statistics: dict[str, list[tuple[NDArray[np.float64], ...]]] = {}
-        path = self.path / _DATA.format(episode_chunk=0, episode_index=0)
+        path, episodes = (self.path / name.format(**_FIRST) for name in (_DATA, _EPISODES))
         path.parent.mkdir(parents=True)
-        (self.path / "meta").mkdir()
+        episodes.parent.mkdir(parents=True)
         self._schema = self._arrow.schema(
             [(name, self._kind(feature)) for name, feature in self._features.items()]
         )
         self._file = path.open("xb")
-        self._table = parquet.ParquetWriter(self._file, self._schema, compression="zstd")
+        self._table = self._parquet.ParquetWriter(self._file, self._schema, compression="zstd")
 
     def _kind(self, feature: dict[str, Any]) -> Any:
         kind, (count,) = self._arrow.from_numpy_dtype(np.dtype(feature["dtype"])), feature["shape"]
@@ -107,28 +111,39 @@ class LeRobotFolder(TableWriter):
     def end(self) -> None:
         self._table.close()
         task = f"recording {self.info.facts['recording']}"
-        episode = {"episode_index": 0, "tasks": [task], "length": self._length}
         statistics = {name: _joined(parts) for name, parts in self._statistics.items()}
+        episode = {
+            "episode_index": 0,
+            "tasks": [task],
+            "length": self._length,
+            "dataset_from_index": 0,
+            "dataset_to_index": self._length,
+            **{f"{of}/{name}": n for of in ("data", "meta/episodes") for name, n in _FIRST.items()},
+            **{f"stats/{of}/{k}": v for of, each in statistics.items() for k, v in each.items()},
+        }
         info = {
-            "codebase_version": "v2.1",
+            "codebase_version": "v3.0",
             "robot_type": self.info.sensor.name,
             "total_episodes": 1,
             "total_frames": self._length,
             "total_tasks": 1,
-            "total_videos": 0,
-            "total_chunks": 1,
             "chunks_size": 1000,
+            "data_files_size_in_mb": 100,
+            "video_files_size_in_mb": 200,
             "fps": self._fps,
             "splits": {"train": "0:1"},
             "data_path": _DATA,
             "video_path": None,
             "features": self._features,
         }
+        tasks = self._arrow.table({"task_index": [0], "task": [task]})
+        tasks = tasks.replace_schema_metadata({"pandas": json.dumps(_BY_TASK)})
+        self._parquet.write_table(tasks, self.path / "meta/tasks.parquet")
+        episodes = self._arrow.Table.from_pylist([episode])
+        self._parquet.write_table(episodes, self.path / _EPISODES.format(**_FIRST))
         for name, content in {
             "info.json": info,
-            "tasks.jsonl": {"task_index": 0, "task": task},
-            "episodes.jsonl": episode,
-            "episodes_stats.jsonl": {"episode_index": 0, "stats": statistics},
+            "stats.json": statistics,
             "kappaskin.json": self.info.facts | {"resampled": _RESAMPLED},
         }.items():
             (self.path / "meta" / name).write_text(f"{json.dumps(content)}\n", encoding="utf-8")

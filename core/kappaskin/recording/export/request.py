@@ -212,9 +212,11 @@ def recording_info(recording: Recording, request: ExportRequest) -> RecordingInf
             number = {"number": each.number, "since": max(each.at, 0.0)}
             setups.append(number | _setup_facts(setup, sensor))
     if not setups:
+        until, remedy = "", "record for longer: the first result takes a few seconds"
+        if math.isfinite(request.end):
+            until, remedy = f" until {request.end:g} s", "export a later span"
         raise Refusal(
-            f"{path}: was recorded without settings until {request.end:g} s, so no frame was "
-            "computed; export a later span"
+            f"{path}: was recorded without settings{until}, so no frame was computed; {remedy}"
         )
     Ni, Nj = (max(setup[name] for setup in setups) for name in ("Ni", "Nj"))
     recording.budget.take(_PER_COLUMN * Ni * Nj, f"a table of {Ni} x {Nj} coefficients")

@@ -1,4 +1,4 @@
-"""Estimates as entities of Rerun: the skin, the contact, readings as images, and scalars."""
+"""Estimates as entities of Rerun: the skin, the contact, readings as tensors, and scalars."""
 
 import importlib
 import math
@@ -23,10 +23,12 @@ PICTURE = 1 / 30
 _SCALARS = 0.1  # s of scalars that are sent at once
 _POINTS = 33  # of the skin along each of its sides
 _PIXELS = 64  # of an image along each side, where elements are in no grid
+_EYE: Array = np.array([0.3, -1.2, 0.8])  # from the middle of a skin whose longer side is 1
 _ARROW = 0.2  # of the longer side: an arrow along the normal
 _COLOURS: Array = np.array([[*bytes.fromhex(anchor[1:])] for anchor in SEQUENTIAL])
 _PLACES = np.linspace(0, 1, len(_COLOURS))
 _GREEN = (31, 209, 122)
+_TRANSLUCENT = (255, 255, 255, 190)  # or the skin would hide the axes of a contact
 
 _QUANTITIES = [q for q in REPORTED if q.group in ("frame", "fit", "contact") and q.published]
 _numbers = numbers_of(_QUANTITIES)
@@ -63,8 +65,8 @@ class RerunStream:
         self._next_picture = -math.inf
         self._is_drawn = False
 
-    def _begin(self, kinds: list[str]) -> None:
-        """Send what holds for all times, and how a viewer arranges it and `kinds` of readings."""
+    def _begin(self, skin: "_Skin") -> None:
+        """Send what holds for all times, and how a viewer arranges it."""
         rr = self._rr
         self._static("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
         for name, columns in scalars().items():
@@ -84,13 +86,29 @@ class RerunStream:
                 ("Curvature in 1/m", "contact/principal"),
             )
         ]
+        layout = skin.pipeline.sensor.layout
         images = [
-            blueprint.Spatial2DView(name=name, origin=f"{self._root}/readings/{name}")
-            for name in kinds
+            blueprint.TensorView(
+                name=f"{name} in {unit}",
+                origin=f"{self._root}/readings/{name}",
+                slice_selection=blueprint.TensorSliceSelection(
+                    width=1, height=rr.TensorDimensionSelection(dimension=0, invert=True)
+                ),
+                scalar_mapping=blueprint.TensorScalarMapping(
+                    colormap="CyanToYellow", mag_filter="Nearest"
+                ),
+            )
+            for name, unit in zip(layout.kind_names, layout.kind_units, strict=True)
         ]
+        middle = skin.rest.points.mean(axis=0)
         views = blueprint.Horizontal(
             blueprint.Spatial3DView(
-                name="Skin, in m", origin=root, contents=["$origin/skin", "$origin/contact/**"]
+                name="Skin, in m",
+                origin=root,
+                contents=["$origin/skin", "$origin/contact/**"],
+                eye_controls=blueprint.EyeControls3D(
+                    position=middle + skin.side * _EYE, look_target=middle
+                ),
             ),
             blueprint.Vertical(blueprint.Horizontal(*images), *plots),
         )
@@ -130,7 +148,7 @@ class RerunStream:
         rr, estimate = self._rr, reported.estimate
         if self._skin is None or self._skin.pipeline is not pipeline:
             self._skin = _Skin(pipeline)
-            self._begin(pipeline.sensor.layout.kind_names)
+            self._begin(self._skin)
         skin = self._skin
         self.stream.set_time("time", timestamp=time)
         if np.isfinite(estimate.coefficients).all():
@@ -141,6 +159,7 @@ class RerunStream:
                     vertex_positions=skin.rest.displaced(displacement),
                     triangle_indices=skin.rest.triangles,
                     vertex_colors=skin.colours(displacement),
+                    albedo_factor=_TRANSLUCENT,
                 ),
                 rr.AnyValues(displacement_m=displacement),
             )
@@ -148,7 +167,8 @@ class RerunStream:
         kinds = zip(layout.kind_names, layout.kind_units, strict=True)
         readings = layout.by_kind(estimate.curvature)
         for (name, unit), values in zip(kinds, readings, strict=True):
-            image = rr.Image(skin.image(values), color_model="L")
+            image, largest = skin.image(values), skin.largest(name, values)
+            image = rr.Tensor(image, dim_names=("y", "x"), value_range=(-largest, largest))
             self._log(f"readings/{name}", image, rr.AnyValues(unit=unit))
         if estimate.contact.present:
             self._draw_contact(reported, skin.side)
@@ -164,8 +184,8 @@ class RerunStream:
         turn = rr.Quaternion(xyzw=Rotation.from_matrix(frame.T).as_quat())
         pose = rr.Transform3D(translation=place, quaternion=turn)
         self._log("contact/frame", pose, rr.TransformAxes3D(length))
-        force = reported.contact.force
-        label = f"{force:.3g} N" if math.isfinite(force) else ""
+        force, sd = reported.contact.force, reported.contact.force_sd
+        label = f"{force:.3g} ± {sd:.1g} N" if math.isfinite(force) else ""
         arrow = length * geometry.normal
         self._log(
             "contact/normal",
@@ -197,10 +217,11 @@ class _Skin:
         self.rest = RestMesh(patch, _POINTS, _POINTS)
         self._values = basis.at(self.rest.positions)
         self._deepest = 1e-4 * self.side
+        self._largest: dict[str, float] = {}
         x, y = (np.unique(of.round(9)) for of in layout.positions.T)
         if len(x) * len(y) != len(layout):
             x, y = ((np.arange(_PIXELS) + 0.5) / _PIXELS * length for length in (patch.a, patch.b))
-        pixels = np.stack(np.meshgrid(x, y[::-1]), axis=-1)  # y points up
+        pixels = np.stack(np.meshgrid(x, y), axis=-1)
         self._element = KDTree(layout.positions).query(pixels)[1]
         self._off = ~patch.contains(pixels.reshape(-1, 2)).reshape(pixels.shape[:2])
 
@@ -216,9 +237,19 @@ class _Skin:
         columns: list[Array] = [np.interp(share, _PLACES, of) for of in _COLOURS.T]
         return np.column_stack(columns).astype(np.uint8)
 
+    def largest(self, kind: str, values: Array) -> float:
+        """The largest of the readings of a `kind` so far, without its sign."""
+        before = self._largest.get(kind, np.finfo(float).tiny)
+        self._largest[kind] = float(np.fmax.reduce(np.abs(values), initial=before))
+        return self._largest[kind]
+
     def image(self, values: Array) -> "np.ndarray[Any, np.dtype[np.float32]]":
-        """Values (P,) of the elements as an image of the skin; NaN off it."""
-        return np.where(self._off, np.nan, values[self._element]).astype(np.float32)
+        """Values (P,) of the elements along y and x, both upward; 0 off the skin or not known.
+
+        A viewer of tensors draws NaN as the least value.
+        """
+        found = np.where(self._off, 0.0, values[self._element])
+        return np.nan_to_num(found).astype(np.float32)
 
 
 _PATIENCE = 60.0  # s until all is on the disk

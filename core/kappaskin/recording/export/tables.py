@@ -281,8 +281,8 @@ _README = """{program} exported the recording {recording}.
 
 Each data set has a row for each frame, in the order in which the frames came. Its attributes
 unit and description say what it is; no unit is a plain number. The data set time is the scale of
-the first dimension of all of them. Further dimensions have scales in the group axes: names of
-components or the numbers of elements and functions. NaN is what is not known. The attributes of
+the first dimension of all of them. Scales of further dimensions are names of components or
+the numbers of elements and functions. NaN is what is not known. The attributes of
 the file are texts or JSON: device, skin, positions of the elements in m, settings, calibration and
 tare.
 
@@ -323,12 +323,11 @@ class Hdf5Table(TableWriter):
             for n, (label, names) in enumerate(column.axes, 1):
                 numbers = all(name.isdecimal() for name in names)
                 which = "_".join(names) if label == "component" else f"{label}_{len(names)}"
-                path = f"axes/{which}"
-                if path not in self._file:
+                if which not in self._file:
                     made_of = np.arange(len(names)) if numbers else np.array(names, "S")
-                    self._file.create_dataset(path, data=made_of).make_scale(label)
+                    self._file.create_dataset(which, data=made_of).make_scale(label)
                 made.dims[n].label = label
-                made.dims[n].attach_scale(self._file[path])
+                made.dims[n].attach_scale(self._file[which])
 
     def write(self, block: Block) -> None:
         for name, values in block.items():
