@@ -214,6 +214,8 @@ class LessonStepPage(QWidget):
         whole.addWidget(self.area)
         self.question_view: QuestionView | None = None
         self._shown: tuple[str, int] | None = None
+        self._judged = False
+        self.area.verticalScrollBar().rangeChanged.connect(guarded(self._see_feedback))
 
     def show_progress(self, progress: Progress, message: str) -> None:
         """Show the present step, and the result of the answer."""
@@ -223,12 +225,13 @@ class LessonStepPage(QWidget):
             self._make(progress)
         if self.question_view is not None:
             self.question_view.show_answer(progress.answer, message)
+            self._judged = not another
             if not another:
-                # Once the feedback is laid out below the question.
+                # Once the feedback is laid out below the question, and when it got longer.
                 QTimer.singleShot(0, self.question_view, guarded(self._see_feedback))
 
-    def _see_feedback(self) -> None:
-        if self.question_view is not None:
+    def _see_feedback(self, *_: object) -> None:
+        if self.question_view is not None and self._judged:
             self.area.ensureWidgetVisible(self.question_view.feedback)
 
     def _see_answer(self, *_: object) -> None:
