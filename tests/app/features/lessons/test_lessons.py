@@ -50,7 +50,8 @@ def answer_wrongly_then_rightly(window: MainWindow, question: Question, until) -
         until(lambda: math.isfinite(number_seen(window, how)))
     if isinstance(how, LessonTask):
         until(lambda: not how.check(teaching.figures()))
-    teaching.answer(given(window, how, right=False))
+    wrong = given(window, how, right=False)
+    until(lambda: teaching.answer(wrong) or teaching.progress.answer.tries)  # once it is judged
     assert not teaching.progress.answer.right
     assert question.hint in feedback.text()
     if isinstance(how, LessonTask):
