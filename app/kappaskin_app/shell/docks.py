@@ -334,7 +334,7 @@ class Docks(QObject):
         if dock in self.below and not dock.isFloating():
             least = self._needed(name) + dock.titleBarWidget().sizeHint().height()
             heighten(self._window, dock, self._heights[name], least)
-        self._share_columns()
+        self.share_columns()
         dock.raise_()
 
     def _needed(self, name: str) -> int:
@@ -345,7 +345,8 @@ class Docks(QObject):
             return layout.totalMinimumHeightForWidth(self._across)
         return shown.minimumSizeHint().height()
 
-    def _share_columns(self) -> None:
+    def share_columns(self) -> None:
+        """Give a dock above another in a column most of the height."""
         heights = [round(share * self._window.height()) for share in _UPPER]
         for above, other in self._above.items():
             both = [self[above], self[other]]

@@ -131,6 +131,8 @@ class Layouts(QObject):
             self.full_screen.leave(partial(self.apply, layout))
         elif self.now != layout:
             self.apply(layout)
+            if name not in self.own:
+                self._all.share_columns()
         if name == self._full and self.full_screen is not None:
             self.full_screen.enter()
 

@@ -125,12 +125,14 @@ def _write(painter: QPainter, view: QWidget, caption: str) -> None:
     painter.drawText(_lines(view, caption), _WRAPPED, caption)
 
 
-def chosen_file(parent: QWidget, title: str, flat: bool) -> Path | None:
-    """The file selected for a picture, if any; a `Refusal` as of `with_ending`."""
+def chosen_file(parent: QWidget, title: str, flat: bool, name: str = "") -> Path | None:
+    """The file selected for a picture, if any; `name` is proposed, else `title`.
+
+    A `Refusal` as of `with_ending`.
+    """
     kinds = "Picture (*.png);;Drawing (*.svg)" if flat else "Picture (*.png)"
-    name, kind = QFileDialog.getSaveFileName(
-        parent, f"Export {title}", str(proposed(f"{title}.png")), kinds
-    )
-    if not name:
+    asked = str(proposed(f"{name or title}.png"))
+    file, kind = QFileDialog.getSaveFileName(parent, f"Export {title}", asked, kinds)
+    if not file:
         return None
-    return Path(name) if has_suffix(Path(name)) else with_ending(name, kind[-5:-1])
+    return Path(file) if has_suffix(Path(file)) else with_ending(file, kind[-5:-1])

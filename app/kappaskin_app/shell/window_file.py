@@ -27,6 +27,7 @@ from kappaskin_app.widgets.text import ERROR_BARS
 FORMAT = 1
 _LONGEST = 200  # characters of a name
 _MOST = 100  # of anything that is listed
+_LESSONS, _PROGRESS = 40, 20_000  # lessons of which the progress is kept; characters of one
 _PX = 100_000  # px, larger than any screen
 _HEAD = "The state of Kappaskin's window. It may be edited while no window is open."
 _WAYS, _SHARES = ("tabbed", "front", "beside"), ("share", "along")
@@ -40,7 +41,7 @@ class WindowState:
     `place` is (x, y, width, height) in px, `keys` are the changed shortcuts, `done` and `files`
     the recent commands and files, `own` the saved layouts, `now` the present one, `start` whether
     the welcome banner is shown, `letters` the size of the font in percent, `error_bars` those that
-    are shown, and `folded` the collapsed panels of settings.
+    are shown, `folded` the collapsed panels of settings, and `lessons` the progress in each lesson.
     """
 
     theme: str = ""
@@ -55,6 +56,7 @@ class WindowState:
     letters: float = 100.0
     error_bars: str = "sigma"
     folded: tuple[str, ...] = ()
+    lessons: Mapping[str, str] = field(default_factory=dict)
 
 
 def merged(mine: WindowState, before: WindowState, theirs: WindowState) -> WindowState:
@@ -89,6 +91,7 @@ def to_text(state: WindowState) -> str:
     document["format"] = FORMAT
     document["window"] = _window(state)
     document["shortcuts"] = dict(state.keys)
+    document["lessons"] = dict(state.lessons)
     if state.now is not None:
         document["layout"] = _layout_table(state.now)
     document["layouts"] = {name: _layout_table(layout) for name, layout in state.own.items()}
@@ -144,6 +147,7 @@ def from_text(text: str) -> WindowState:
         _letters(window),
         _one_of(_part(window, "error_bars", str, "sigma"), tuple(ERROR_BARS)),
         _names(window, "folded"),
+        _lessons(_part(document, "lessons", dict, {})),
     )
 
 
@@ -161,6 +165,12 @@ def _letters(window: Mapping[str, Any]) -> float:
     ):
         raise Refusal(f"expected a text size from 80 to 200 %, got {percent!r:.60}")
     return float(percent)
+
+
+def _lessons(table: Mapping[str, Any]) -> dict[str, str]:
+    """The last entries that are of use: a lesson that is changed gets a new one."""
+    whole = {k: v for k, v in table.items() if isinstance(v, str) and len(v) <= _PROGRESS}
+    return dict(list(whole.items())[-_LESSONS:])
 
 
 def _few(values: Any) -> Any:
@@ -291,6 +301,7 @@ class WindowSaver(QObject):
         self._window, self._menus = window, menus
         self._file: WindowFile | None = None
         self._saved = WindowState()
+        self.lessons: dict[str, str] = {}
         self._save = BackgroundSave(window.tasks, self._merge, window.notify)
 
     def begin(self, path: Path) -> None:
@@ -324,7 +335,7 @@ class WindowSaver(QObject):
 
     def _restore(self, state: WindowState) -> list[str]:
         """Restore a state; returns what was refused."""
-        window = self._window
+        window, self.lessons = self._window, dict(state.lessons)
         if state.place is not None:
             screens = [screen.availableGeometry() for screen in QGuiApplication.screens()]
             window.setGeometry(clamped(QRect(*state.place), screens))
@@ -357,6 +368,7 @@ class WindowSaver(QObject):
             now=layout,
             own=dict(window.layouts.own),
             folded=window.panels.folded,
+            lessons=dict(self.lessons),
         )
 
 

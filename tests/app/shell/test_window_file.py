@@ -151,3 +151,11 @@ def test_letters_are_kept_and_those_that_no_form_offers_are_refused(tmp_path: Pa
     for bad in ("1000", "nan", "true", "'large'"):
         with pytest.raises(Refusal, match="a text size from 80 to 200"):
             from_text(f"format = 1\n[window]\nletters = {bad}")
+
+
+def test_progress_of_lessons_comes_back_and_what_is_no_progress_is_dropped() -> None:
+    kept = WindowState(lessons={f"{n:02}.md": "[1, 2, []]" for n in range(41)})
+    assert list(from_text(to_text(kept)).lessons) == [f"{n:02}.md" for n in range(1, 41)]
+    assert from_text("format = 1\n[lessons]\na = 3\nb = '[0, 0, []]'").lessons == {
+        "b": "[0, 0, []]"
+    }

@@ -37,7 +37,7 @@ class LessonsFeature:
         )
         self.teaching = Teaching(
             *(shell.history, session, shell.display, shell),
-            *(session.request_source, self._seen, shell.tasks),
+            *(session.request_source, self._seen, shell.tasks, shell.saver),
         )
         self.pointing = ControlPointer(self._forms, self._places, docks.reveal, shell)
         self.lesson.bind(self.teaching)

@@ -15,6 +15,7 @@ from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.settings.form_fields import Choice, Several, Text
 
 _RECENT = 24  # estimates of which the median is taken: one alone jumps with the noise
+_LEAST = 3  # of them: the first may still be of the settings before
 
 
 def _peak(row: int) -> Callable[[Estimate], float]:
@@ -92,6 +93,11 @@ class RecentEstimates:
         """Drop the estimates of the last settings."""
         self._recent.clear()
 
+    @property
+    def settled(self) -> bool:
+        """Whether the figures are those of the present settings."""
+        return len(self._recent) >= _LEAST
+
     def figures(
         self, settings: Settings, status: Status, others: Mapping[str, Callable[[], float]]
     ) -> dict[str, float | str]:
@@ -102,7 +108,7 @@ class RecentEstimates:
         }
         for name, of in OF_AN_ESTIMATE.items():
             values = [value for e in self._recent if math.isfinite(value := of(e))]
-            found[name] = float(np.median(values)) if values else math.nan
+            found[name] = float(np.median(values)) if values and self.settled else math.nan
         found |= {name: of(status) for name, of in OF_THE_STATUS.items()}
         for name in OF_FEATURES:
             found[name] = others[name]() if name in others else math.nan

@@ -97,7 +97,10 @@ class Step:
 
 @dataclass(frozen=True)
 class Lesson:
-    """A lesson of about so many `minutes`, in steps; on a ready `hand` where one is named."""
+    """A lesson of about so many `minutes`, in steps; on a ready `hand` where one is named.
+
+    `version` is a checksum of its text: answers belong to one text.
+    """
 
     name: str
     title: str
@@ -105,6 +108,7 @@ class Lesson:
     learn: str
     steps: tuple[Step, ...]
     hand: str = ""
+    version: int = 0
 
     def begins(self, step: int) -> Mapping[str, Any] | None:
         """The settings that `step` begins with, from it or the last step that has any."""

@@ -2,6 +2,7 @@
 
 import re
 import tomllib
+import zlib
 from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, fields
@@ -175,6 +176,7 @@ def lesson_of(text: str, name: str) -> Lesson:
         table.words("learn"),
         steps,
         hand,
+        zlib.crc32(text.encode()),
     )
 
 

@@ -214,6 +214,8 @@ class LessonStepPage(QWidget):
         whole.addWidget(self.area)
         self.question_view: QuestionView | None = None
         self._shown: tuple[str, int] | None = None
+        self._judged = False
+        self.area.verticalScrollBar().rangeChanged.connect(guarded(self._see_feedback))
 
     def show_progress(self, progress: Progress, message: str) -> None:
         """Show the present step, and the result of the answer."""
@@ -223,12 +225,13 @@ class LessonStepPage(QWidget):
             self._make(progress)
         if self.question_view is not None:
             self.question_view.show_answer(progress.answer, message)
+            self._judged = not another
             if not another:
-                # Once the feedback is laid out below the question.
+                # Once the feedback is laid out below the question, and when it got longer.
                 QTimer.singleShot(0, self.question_view, guarded(self._see_feedback))
 
-    def _see_feedback(self) -> None:
-        if self.question_view is not None:
+    def _see_feedback(self, *_: object) -> None:
+        if self.question_view is not None and self._judged:
             self.area.ensureWidgetVisible(self.question_view.feedback)
 
     def _see_answer(self, *_: object) -> None:
@@ -290,10 +293,12 @@ class _List(QListWidget):
 class ListPage(QWidget):
     """The list of lessons; `taken` brings the one to start, `open_wanted` requests a file.
 
+    `again` brings the one to start without the answers so far.
     `hand_out_wanted` brings the lesson to print, `teacher_wanted` requests the teacher's page.
     """
 
     taken = Signal(str)
+    again = Signal(str)
     open_wanted = Signal()
     hand_out_wanted = Signal(str)
     teacher_wanted = Signal()
@@ -315,6 +320,11 @@ class ListPage(QWidget):
             "Start or continue the lesson (Enter, or double-click). It changes the settings; Leave "
             "restores them.",
         )
+        self.anew = button(
+            "Start a&gain",
+            "again",
+            "Start from the first step, and forget the answers so far.",
+        )
         self.open = button(f"&Open file{ELLIPSIS}", "open-lesson", "Open a lesson file.")
         self.hand_out = button(
             f"Save hand-ou&t{ELLIPSIS}",
@@ -332,13 +342,14 @@ class ListPage(QWidget):
         stack.addWidget(self.list, 1)
         stack.addWidget(self.about)
         stack.addWidget(self.message)
-        stack.addLayout(in_a_row(self.begin, self.open))
+        stack.addLayout(in_a_row(self.begin, self.anew, self.open))
         stack.addLayout(in_a_row(self.hand_out, self.teacher))
         self._progress: Mapping[str, Progress] = {}
         self.list.currentItemChanged.connect(guarded(self._describe))
         self.list.itemDoubleClicked.connect(guarded(self._take))
         self.list.taken.connect(guarded(self._take))
         self.begin.clicked.connect(guarded(self._take))
+        self.anew.clicked.connect(guarded(lambda *_: self.again.emit(self.selected)))
         self.open.clicked.connect(guarded(lambda *_: self.open_wanted.emit()))
         self.hand_out.clicked.connect(guarded(lambda *_: self.hand_out_wanted.emit(self.selected)))
         self.teacher.clicked.connect(guarded(lambda *_: self.teacher_wanted.emit()))
@@ -366,13 +377,14 @@ class ListPage(QWidget):
 
     def _describe(self, *_: object) -> None:
         one = self._progress.get(self.selected)
+        self.anew.setEnabled(one is not None and bool(one.seen or one.answers))
         for way in (self.begin, self.hand_out):
             way.setEnabled(one is not None)
         if one is None:
             self.about.setText("")
             return
         far = one.describe()
-        self.begin.setText("&Continue" if far.startswith("step") else "S&tart lesson")
+        self.begin.setText("&Continue" if far else "S&tart lesson")
         said = f"{one.lesson.minutes} min{', ' + far if far else ''}. {one.lesson.learn}"
         self.about.setText(said)
 
@@ -394,7 +406,9 @@ class EndPage(QWidget):
         self.name.setObjectName("student")
         self.name.setMaxLength(80)
         self.name.setAccessibleName("Your name")
-        self.name.setToolTip("It is written on the figure, and saved nowhere else.")
+        self.name.setToolTip(
+            "It is written on the figure, also in its file name, and nowhere else."
+        )
         prompt.setBuddy(self.name)
         pass_window_keys(self.name)
         self.save = button(

@@ -70,6 +70,7 @@ class LessonPanel(QWidget):
         teaching.changed.connect(guarded(self._show))
         self.seen.connect(guarded(teaching.look))
         self.list.taken.connect(guarded(teaching.take))
+        self.list.again.connect(guarded(teaching.restart))
         self.list.open_wanted.connect(guarded(teaching.open))
         self.list.hand_out_wanted.connect(guarded(teaching.hand_out))
         self.step.answered.connect(guarded(teaching.answer))

@@ -1,7 +1,11 @@
 """Progress in a lesson: the present step, and the answers."""
 
+import json
 import math
-from dataclasses import dataclass, field, replace
+import re
+from contextlib import suppress
+from dataclasses import astuple, dataclass, field, replace
+from pathlib import Path
 
 from kappaskin.errors import Refusal
 from kappaskin_app.features.lessons.expression import Figures
@@ -71,7 +75,7 @@ def number_in(text: str) -> float:
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise Refusal("Type a number, such as 4.7.")
+        raise Refusal("Type a number without its unit, such as 4.7.")
     return value
 
 
@@ -83,6 +87,26 @@ class Progress:
     step: int = 0
     seen: int = 0
     answers: dict[int, Answer] = field(default_factory=dict[int, Answer])
+
+    @property
+    def key(self) -> str:
+        """What `text` is saved by: another version of the lesson has another."""
+        return f"{self.lesson.name} {self.lesson.version:08x}"
+
+    def text(self) -> str:
+        """The progress to be saved."""
+        answers = [(step, *astuple(answer)) for step, answer in self.answers.items()]
+        return json.dumps([self.step, self.seen, answers])
+
+    def resume(self, text: str) -> "Progress":
+        """Itself, with the steps and answers of a saved `text` unless that is damaged."""
+        with suppress(ValueError, TypeError, OverflowError, RecursionError):
+            step, seen, answers = json.loads(text)
+            steps = len(self.lesson.steps)
+            found = {int(at): Answer(str(said), int(n), bool(ok)) for at, said, n, ok in answers}
+            if 0 <= int(step) <= int(seen) <= steps and all(0 <= at < steps for at in found):
+                self.step, self.seen, self.answers = int(step), int(seen), found
+        return self
 
     def go(self, step: int) -> None:
         """Go to a step; one past the last is where the figure is handed in."""
@@ -107,12 +131,21 @@ class Progress:
         if self.question is not None and not self.answer.closed:
             self.answers[self.step] = judged(self.question, given, figures, self.answer)
 
+    @property
+    def right(self) -> int:
+        """The number of right answers."""
+        return sum(answer.right for answer in self.answers.values())
+
     def describe(self) -> str:
         """The progress as text."""
-        right = sum(answer.right for answer in self.answers.values())
         if self.seen == len(self.lesson.steps):
-            return f"done, {right} of {self.lesson.questions} right"
+            return f"done, {self.right} of {self.lesson.questions} right"
         return f"step {self.seen + 1} of {len(self.lesson.steps)}" if self.seen else ""
+
+    def file_name(self, student: str) -> str:
+        """The name of the figure to hand in: a list of such files is a list of the class."""
+        who = re.sub(r"[^\w-]+", "-", student.strip()).strip("-")
+        return f"{Path(self.lesson.name).stem}_{who}_{self.right}-of-{self.lesson.questions}"
 
     def rows(self) -> list[tuple[str, str, str, str]]:
         """Of each question: its step's title, its text, the answer, the result."""

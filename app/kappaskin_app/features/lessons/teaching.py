@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QFileDialog, QWidget
 from kappaskin.errors import Refusal
 from kappaskin.frames import Estimate
 from kappaskin_app.features.lessons.figures import RecentEstimates
-from kappaskin_app.features.lessons.lesson import LessonTask, whole
+from kappaskin_app.features.lessons.lesson import Lesson, LessonTask, whole
 from kappaskin_app.features.lessons.lesson_file import READY, read_lesson
 from kappaskin_app.features.lessons.progress import Progress
 from kappaskin_app.features.lessons.sheets import sheet, write_hand_out
@@ -25,6 +25,7 @@ from kappaskin_app.shell.history import History
 from kappaskin_app.shell.pictures import caption_now, chosen_file, save_view
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings
+from kappaskin_app.shell.window_file import WindowSaver
 from kappaskin_app.shell.work_dialog import with_ending
 
 _FILES, _PDF = "Lesson (*.md)", "PDF (*.pdf)"
@@ -49,7 +50,8 @@ class Teaching(QObject):
     `progress` is that of the present lesson, None without one; `message` says why an answer could
     not be judged, or a file not be read. `notified` brings the result of a request, `pointed` the
     controls to point at, `taken_up` reports that a lesson is resumed by undo. `connect` changes the
-    source, `views` returns pictures for the figure to hand in, `tasks` writes hand-outs.
+    source, `views` returns pictures for the figure to hand in, `tasks` writes hand-outs and
+    `saver` the progress.
     """
 
     changed = Signal()
@@ -66,11 +68,12 @@ class Teaching(QObject):
         connect: Callable[[str], None],
         views: Callable[[], list[QPixmap]],
         tasks: Tasks,
+        saver: WindowSaver,
     ) -> None:
         super().__init__(window)
         self._history, self._session, self._display = history, session, display
         self._window, self._connect = window, connect
-        self._views, self._hand_out = views, Path()
+        self._views, self._saver, self._hand_out = views, saver, Path()
         self._writing = BackgroundTask(
             *(tasks, "Writing the hand-out", self._written),
             cancelled="Cancelled; no hand-out was written.",
@@ -90,7 +93,7 @@ class Teaching(QObject):
     def look(self) -> None:
         """Read the lessons that come with the program, the first time."""
         if not self.taken:
-            self.taken = {str(file): Progress(read_lesson(file)) for file in READY}
+            self.taken = {str(file): self._resumed(read_lesson(file)) for file in READY}
             self.changed.emit()
 
     # Requests of the user.
@@ -107,7 +110,7 @@ class Teaching(QObject):
         """Start the lesson in a file, or report why it cannot be read."""
         self.look()
         try:
-            self.taken[str(file)] = Progress(read_lesson(file))
+            self.taken[str(file)] = self._resumed(read_lesson(file))
         except Refusal as refusal:
             self.message = str(refusal)
             self.changed.emit()
@@ -121,7 +124,22 @@ class Teaching(QObject):
             open_another_window(file, "--source", f"hand:{hand}")
             self.notified.emit(f"{progress.lesson.title}: it opens in a window of its hand.")
             return
-        self._go(progress, 0 if progress.at_end else progress.step)
+        self._go(progress, progress.step)
+
+    def restart(self, file: str) -> None:
+        """Start the lesson in `file` from its first step, without answers."""
+        self.taken[file] = Progress(self.taken[file].lesson)
+        self._save(self.taken[file])
+        self.take(file)
+
+    def _resumed(self, lesson: Lesson) -> Progress:
+        """The progress in a lesson: that of the last window, if it is the same text."""
+        progress = Progress(lesson)
+        return progress.resume(self._saver.lessons.get(progress.key, ""))
+
+    def _save(self, progress: Progress) -> None:
+        self._saver.lessons[progress.key] = progress.text()
+        self._saver.write()
 
     def leave(self) -> None:
         """Restore the settings and the source from before the lesson."""
@@ -169,6 +187,7 @@ class Teaching(QObject):
         self.progress, self._before, self.message = progress, place.before, ""
         if progress is not None:
             progress.go(place.step)
+            self._save(progress)
         if place.settings != self._history.settings:
             self._history.apply(place.settings)
         at_work = progress is not None and not progress.at_end
@@ -185,10 +204,20 @@ class Teaching(QObject):
             return
         try:
             self.message = ""
+            self._expect_settled(self.progress)
             self.progress.give(given, self.figures())
+            self._save(self.progress)
         except Refusal as refusal:
             self.message = str(refusal)
         self.changed.emit()
+
+    def _expect_settled(self, progress: Progress) -> None:
+        """Refuse to judge a task that is not done while the window does not show the settings."""
+        how = None if progress.question is None else progress.question.how
+        if self._recent.settled or not isinstance(how, LessonTask):
+            return
+        if not how.check(self.figures()):
+            raise Refusal("The window does not show the new settings yet: wait a moment.")
 
     def press(self, number: int) -> None:
         """Apply the settings of a button of this step."""
@@ -210,7 +239,9 @@ class Teaching(QObject):
         settings, views = self._history.settings, self._views()
         caption = caption_now(self._session)
         try:
-            path = chosen_file(self._window, "the figure", flat=True)
+            path = chosen_file(
+                self._window, "the figure", flat=True, name=progress.file_name(student)
+            )
         except Refusal as refusal:
             self.notified.emit(str(refusal))
             return

@@ -4,6 +4,7 @@ import math
 import re
 import runpy
 import textwrap
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kappaskin import Refusal
+from kappaskin.pipeline import Pipeline, Setup
+from kappaskin.scenes import Simulator
 from kappaskin_app.features.lessons.expression import NUMBER, TRUTH, WORD, expression
 from kappaskin_app.features.lessons.figures import KINDS, SETTINGS, RecentEstimates
 from kappaskin_app.features.lessons.lesson import (
@@ -31,6 +34,7 @@ from kappaskin_app.features.lessons.lesson_file import (
 from kappaskin_app.features.lessons.progress import Answer, Progress, judged, number_in
 from kappaskin_app.shell.settings import Settings, form_field
 from kappaskin_app.shell.settings.form_fields import Range
+from kappaskin_app.shell.simulation import scene_of
 
 TEACHER = runpy.run_path(str(Path(__file__).parents[3] / "guide_lessons.py"))
 FIGURES_SEEN = [name for name in KINDS if name not in SETTINGS]
@@ -234,8 +238,8 @@ def test_a_number_is_right_within_its_tolerance_in_its_unit() -> None:
     question = lesson(f"{ASK}number = 'force * 0.01'\ntolerance = 0.0001\nunit = 'mm'").steps[0]
     for text, right in (("2", True), ("2,09", True), ("1.91", True), ("2.2", False), ("-2", False)):
         assert judged(question.question, text, FIGURES, Answer()).right is right
-    for text in ("", "two", "nan", "inf"):
-        with pytest.raises(Refusal, match="number"):
+    for text in ("", "two", "nan", "inf", "2 mm"):
+        with pytest.raises(Refusal, match="number without its unit"):
             judged(question.question, text, FIGURES, Answer())
 
 
@@ -261,6 +265,45 @@ def test_two_wrong_answers_are_explained_and_then_nothing_is_judged_any_more() -
     progress.go(5)
     assert progress.at_end
     assert progress.describe() == "done, 0 of 1 right"
+
+
+def test_progress_comes_back_from_its_text_to_the_same_lesson_alone() -> None:
+    read = lesson(f"{ASK}choices = ['a', 'b']\nright = 2")
+    progress = Progress(read)
+    progress.give("0", FIGURES)
+    progress.give("1", FIGURES)
+    progress.go(1)
+    assert Progress(read).resume(progress.text()) == progress
+    assert lesson(f"{ASK}choices = ['a', 'c']\nright = 2").version != read.version
+    for text in (
+        "",
+        "3",
+        "[0, 9, []]",
+        "[2, 1, []]",
+        '[0, 0, [[7, "a", 1, true]]]',
+        "[Infinity, 1, []]",
+    ):
+        assert Progress(read).resume(text) == Progress(read), text
+
+
+def test_names_of_figures_list_the_class() -> None:
+    progress = Progress(lesson_of(READY[0].read_text("utf-8"), READY[0].name))
+    progress.give("1", FIGURES)
+    assert (
+        progress.file_name(" Ada L\u00f6velace/.. ") == "01-curvature-gage_Ada-L\u00f6velace_1-of-8"
+    )
+
+
+def test_the_first_lesson_quotes_the_peaks_that_the_window_shows() -> None:
+    read = read_lesson(READY[0])
+    question = next(step.question for step in read.steps if step.title == "Twice the force")
+    assert question is not None
+    assert isinstance(question.how, ChoiceAnswer)
+    quoted = [question.text.split("is ")[1], question.how.options[question.how.right]]
+    for force, words in zip((0.15, 0.30), quoted, strict=True):
+        scene = scene_of(replace(Settings(), **whole({**read.begins(0), "force": force})))
+        estimate = Pipeline(scene.sensor(), Setup())(Simulator(scene).frame(0, lambda: 0.0))
+        assert f"{estimate.curvature[0].min():.1f} " in words
 
 
 def test_a_step_without_settings_begins_with_those_of_one_before() -> None:

@@ -19,7 +19,7 @@ from kappaskin_app.features.lessons.lesson import (
     Question,
 )
 from kappaskin_app.features.lessons.lesson_file import DOCKS, READOUTS, READY, SETTABLE
-from kappaskin_app.features.lessons.progress import DONE
+from kappaskin_app.features.lessons.progress import DONE, Answer
 from kappaskin_app.shell.window import MainWindow
 
 
@@ -50,7 +50,8 @@ def answer_wrongly_then_rightly(window: MainWindow, question: Question, until) -
         until(lambda: math.isfinite(number_seen(window, how)))
     if isinstance(how, LessonTask):
         until(lambda: not how.check(teaching.figures()))
-    teaching.answer(given(window, how, right=False))
+    wrong = given(window, how, right=False)
+    until(lambda: teaching.answer(wrong) or teaching.progress.answer.tries)  # once it is judged
     assert not teaching.progress.answer.right
     assert question.hint in feedback.text()
     if isinstance(how, LessonTask):
@@ -68,7 +69,7 @@ def play(window: MainWindow, name: str, until) -> None:
         window.teaching.go(number)
         assert window.lesson.step.title.text() == step.title
         for target in [window.pointing.targets(place)[0] for place in step.point]:
-            assert target.isVisible(), (name, step.title)
+            until(target.isVisible)  # a panel comes back once the scene before is left
         assert [ring.isVisible() for ring in window.pointing.rings] == [True] * len(step.point)
         for button in range(len(step.buttons)):
             window.teaching.press(button)
@@ -308,6 +309,53 @@ def test_twice_wrong_is_explained_and_shown_and_progress_is_kept(window: MainWin
     assert "each way make the dent sharper" in window.lesson.step.question_view.feedback.text()
 
 
+def test_progress_outlives_the_window_and_is_forgotten_where_one_starts_again(
+    opened, tmp_path: Path
+) -> None:
+    file, first = tmp_path / "window.toml", opened("sim:")
+    first.saver.begin(file)
+    take(first, "01-curvature-gage")
+    first.teaching.answer("0")
+    first.teaching.answer("1")
+    first.teaching.go(3)
+    first.close()
+    second = opened("sim:")
+    second.saver.begin(file)
+    second.docks.reveal("lesson")
+    listed = second.lesson.list
+    assert "step 4 of 8" in listed.about.text()
+    listed.begin.click()
+    assert second.teaching.progress.step == 3
+    assert second.teaching.progress.answers[0] == Answer("Under the arrow", 2, True)
+    second.teaching.leave()
+    listed.anew.click()
+    assert (second.teaching.progress.step, second.teaching.progress.answers) == (0, {})
+    second.saver.finish()
+    assert "Under the arrow" not in file.read_text("utf-8")
+
+
+def test_a_task_is_not_judged_before_the_window_shows_the_settings(
+    window: MainWindow, until
+) -> None:
+    take(window, "01-curvature-gage")
+    window.teaching.go(5)
+    window.history.change("Press", -1, force=0.25)
+    window.lesson.step.question_view.check.click()
+    assert "wait a moment" in window.lesson.step.question_view.feedback.text()
+    assert window.teaching.progress.answer.tries == 0
+    until(lambda: window.teaching.figures()["peak_xx"] < -10)
+    window.lesson.step.question_view.check.click()
+    assert window.teaching.progress.answer.outcome() == "right"
+
+
+def test_the_layout_to_teach_gives_a_lesson_most_of_the_height(window: MainWindow) -> None:
+    window.resize(1280, 720)
+    window.requests.set("letters", 150.0)
+    window.layouts.choose("Teach")
+    QApplication.processEvents()
+    assert window.docks["lesson"].height() > 1.4 * window.docks["settings"].height()
+
+
 @pytest.mark.full
 def test_what_is_said_to_an_answer_is_scrolled_to(window: MainWindow, until) -> None:
     take(window, "07-silent-mode")
@@ -317,6 +365,22 @@ def test_what_is_said_to_an_answer_is_scrolled_to(window: MainWindow, until) -> 
     assert asking.feedback.visibleRegion().isEmpty()
     window.teaching.answer("5")
     until(lambda: not asking.feedback.visibleRegion().isEmpty())
+
+
+def test_a_longer_answer_is_scrolled_to_whole(window: MainWindow, until) -> None:
+    window.resize(1280, 600)
+    window.requests.set("letters", 150.0)
+    take(window, "01-curvature-gage")
+    window.teaching.go(3)
+    view = window.lesson.step.question_view
+    feedback = view.feedback
+    for given in (0, 2):
+        view.options.button(given).click()
+        QApplication.processEvents()
+        view.check.click()
+        for _ in range(20):
+            QApplication.processEvents()
+    assert feedback.visibleRegion().boundingRect().height() == feedback.height()
 
 
 @pytest.mark.full
@@ -329,8 +393,14 @@ def test_the_figure_holds_the_name_and_the_window(
     window.lesson.end.name.setText("Ada <Lovelace>")
     files = {end: tmp_path / f"figure.{end}" for end in ("png", "svg")}
     for file in files.values():
-        monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_, file=file: (str(file), ""))
+        asked = list[str]()
+        monkeypatch.setattr(
+            QFileDialog,
+            "getSaveFileName",
+            lambda _, __, path, *___, file=file, asked=asked: asked.append(path) or (str(file), ""),
+        )
         window.lesson.end.save.click()
+        assert Path(asked[0]).name.startswith("01-curvature-gage_Ada-Lovelace_1-of-8")
     picture = QImage(str(files["png"]))
     assert picture.text("Title") == "What a curvature gage measures"
     assert picture.text("Description").startswith("Ada <Lovelace>: kappaskin ")
