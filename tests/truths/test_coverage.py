@@ -7,6 +7,10 @@ from math import sqrt
 import numpy as np
 import pytest
 
+import benchmark
+from kappaskin import LeastSquares, Patch, Plate, SensorLayout, basis_for
+from kappaskin.contact import Contacts
+from navier import HingedPlate, Load
 from studies import (
     BENT,
     CAP_SHAPES,
@@ -60,9 +64,10 @@ def test_intervals_on_a_flat_or_shallow_skin_cover_the_truth(case, frames):
     found = figures(case, frames)
 
     low, high = 0.92 - slack(frames), 0.98 + slack(frames)
+    of_place = high + 0.01 * (case in SHALLOW)  # which have an error for the theory, of this truth
     assert found.found == 1
-    assert low <= found.x <= high
-    assert low <= found.y <= high
+    assert low <= found.x <= of_place
+    assert low <= found.y <= of_place
     assert low <= found.force <= high
 
 
@@ -99,6 +104,45 @@ def test_intervals_on_a_bent_skin_cover_the_truth(case, frames):
     found, least = figures(case, frames), 0.90 - slack(frames)
 
     assert min(found.x, found.y, found.force) >= least
+
+
+@cache
+def half_round():
+    """What is told of loads on the benchmark's bent skin, with a noise in 1/m RMS."""
+    skin = benchmark.BENT
+    patch = Patch(*skin.sides, skin.radii[0])
+    layout = SensorLayout.regular(patch, 10, 10)
+    contacts = Contacts(Plate(patch, rigidity=HingedPlate().rigidity), layout)
+    fit = LeastSquares(basis_for(patch, "hinged", 8, 8), layout)
+    read, _ = benchmark.truth(skin)
+
+    def told(noise, *loads):
+        rng = np.random.default_rng(0)
+        readings = sum(map(read, loads)) + rng.normal(0, noise, (3, 100))
+        return contacts(readings, fit(readings))
+
+    return told
+
+
+@pytest.mark.parametrize("radius", [1e-3, 2e-3, 3e-3, 4e-3])
+@pytest.mark.parametrize("place", [(0.013, 0.015), (0.02, 0.022), (0.03, 0.012)])
+def test_discs_of_any_size_on_a_half_round_skin_have_their_force(place, radius):
+    first, second = half_round()(0.02, Load(*place, 1.5, radius))
+
+    assert not second.present
+    assert first.force == pytest.approx(1.5, rel=8e-3)
+
+
+@pytest.mark.parametrize("radius", [1e-3, 3e-3])
+@pytest.mark.parametrize("apart", [12e-3, 16e-3, 20e-3])
+def test_two_discs_across_a_half_round_skin_are_told_as_two(apart, radius):
+    middle = benchmark.BENT.sides[0] / 2
+    across = [middle - apart / 2, middle + apart / 2]
+
+    both = half_round()(0.231, *(Load(x, 0.02, 2.0, radius) for x in across))
+
+    assert [one.force for one in both] == pytest.approx([2.0, 2.0], rel=0.05)
+    assert sorted(one.position[0] for one in both) == pytest.approx(across, abs=2e-4)
 
 
 @pytest.mark.cases(*HILLS)

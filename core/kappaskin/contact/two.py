@@ -347,13 +347,15 @@ class _Pairs:
         )
 
     def _found(self, readings: _Readings) -> Array:
-        """The two loads (2, 4) on a grid that explain most, and push to the same side."""
+        """The two loads (2, 4) on a grid that explain most, and both push inward."""
         K, used = readings
         _, shared, across = self._pairs(used, self._products)
         norm, read = shared.diagonal(), self._felt @ (K @ self._M)
         # Forces of all pairs, times `across`: what the first explains besides the second.
         forces = np.multiply.outer(read, norm) - shared * read
-        gain = np.where(forces * forces.T > 0, (forces * read[:, None] + forces.T * read), 0.0)
+        gain = np.where(
+            np.minimum(forces, forces.T) > 0, (forces * read[:, None] + forces.T * read), 0.0
+        )
         gain /= across
         first, second = divmod(int(gain.argmax()), len(read))
         pair = [first, second]
