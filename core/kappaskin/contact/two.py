@@ -303,19 +303,19 @@ class _Pairs:
             return contact, NO_CONTACT
         starts = [np.vstack([alone, beside]), self._found(readings)]
         starts.sort(key=lambda each: _tried(several, each, readings).cost)
-        best, are_two = 0.0, False
         for start in starts if hint > _DISTINCT else starts[:1]:
             two = self._climbed(several, start, readings)
             spare = int(used.sum()) - two.p.size
             variance = two.left / spare
             one = self._climbed(several, alone, readings, two.cost + _DISTINCT * variance)
             better = one.worse(two, variance)
-            best = max(best, better)
-            are_two = better > _DISTINCT and self._explains(two, spare, fit, one.left - two.left)
-            if are_two or (better * variance > hint and two.p[:, 3].min() > 0):
+            if better > _DISTINCT and self._explains(two, spare, fit, one.left - two.left):
                 break
-        if not are_two:
-            return replace(contact, single=contact.single and best < _SPREAD), NO_CONTACT
+            contact = replace(contact, single=contact.single and better < _SPREAD)
+            if better * variance > hint and two.p[:, 3].min() > 0:  # no other pair is better
+                return contact, NO_CONTACT
+        else:
+            return contact, NO_CONTACT
         if self._is_line(two, variance, readings):
             return replace(contact, single=False), NO_CONTACT
         self.left = two.left
