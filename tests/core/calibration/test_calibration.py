@@ -247,6 +247,9 @@ def test_on_an_unseen_sweep_the_loops_shrink_more_than_tenfold(second, twist):
     # Every channel by itself, and minor loops count.
     assert (np.abs(before).max(axis=0) > 10 * np.abs(after).max(axis=0)).all()
     assert before.std() > 30 * after.std()
+    if not twist:  # as the guide and lesson 8 say
+        assert np.abs(before).max() == pytest.approx(4.6, abs=0.05)
+        assert np.abs(after).max() == pytest.approx(0.17, abs=0.005)
     # No two ways to one curvature are further apart than a tenth of the loops' 7 1/m.
     assert 2 * np.abs(after).max() < 0.7
 

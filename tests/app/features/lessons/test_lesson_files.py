@@ -7,15 +7,22 @@ import textwrap
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from kappaskin import Refusal
 from kappaskin.pipeline import Pipeline, Setup
-from kappaskin.scenes import Simulator
+from kappaskin.scenes import Simulator, planned
+from kappaskin.skin import Patch
 from kappaskin_app.features.lessons.expression import NUMBER, TRUTH, WORD, expression
-from kappaskin_app.features.lessons.figures import KINDS, SETTINGS, RecentEstimates
+from kappaskin_app.features.lessons.figures import (
+    KINDS,
+    OF_AN_ESTIMATE,
+    SETTINGS,
+    RecentEstimates,
+)
 from kappaskin_app.features.lessons.lesson import (
     UNITS,
     ChoiceAnswer,
@@ -32,8 +39,8 @@ from kappaskin_app.features.lessons.lesson_file import (
     read_lesson,
 )
 from kappaskin_app.features.lessons.progress import Answer, Progress, judged, number_in
-from kappaskin_app.shell.settings import Settings, form_field
-from kappaskin_app.shell.settings.form_fields import Range
+from kappaskin_app.shell.settings import EstimatorSettings, Settings, form_field
+from kappaskin_app.shell.settings.form_fields import Range, setup_values
 from kappaskin_app.shell.simulation import scene_of
 
 TEACHER = runpy.run_path(str(Path(__file__).parents[3] / "guide_lessons.py"))
@@ -294,16 +301,139 @@ def test_names_of_figures_list_the_class() -> None:
     )
 
 
-def test_the_first_lesson_quotes_the_peaks_that_the_window_shows() -> None:
-    read = read_lesson(READY[0])
-    question = next(step.question for step in read.steps if step.title == "Twice the force")
-    assert question is not None
-    assert isinstance(question.how, ChoiceAnswer)
-    quoted = [question.text.split("is ")[1], question.how.options[question.how.right]]
-    for force, words in zip((0.15, 0.30), quoted, strict=True):
-        scene = scene_of(replace(Settings(), **whole({**read.begins(0), "force": force})))
-        estimate = Pipeline(scene.sensor(), Setup())(Simulator(scene).frame(0, lambda: 0.0))
-        assert f"{estimate.curvature[0].min():.1f} " in words
+def estimates(number: int, title: str, changes: dict[str, object], frames: int = 1):
+    """Estimates of the first frames of a step of lesson `number`, with `changes` of settings."""
+    read = read_lesson(READY[number - 1])
+    step = [step.title for step in read.steps].index(title)
+    settings = replace(Settings(), **whole({**read.begins(step), **changes}))
+    scene = scene_of(settings)
+    setup = replace(Setup(), **setup_values(settings, EstimatorSettings))
+    pipeline, simulator = Pipeline(scene.sensor(), setup), Simulator(planned(scene))
+    return [pipeline(simulator.frame(n, lambda: 0.0)) for n in range(frames)]
+
+
+def words(number: int, title: str) -> str:
+    """All that a step says: its text, its question, the right answer, hint and explanation."""
+    step = next(step for step in read_lesson(READY[number - 1]).steps if step.title == title)
+    asked = step.question
+    assert asked is not None
+    how = asked.how
+    right = how.options[how.right] if isinstance(how, ChoiceAnswer) else ""
+    return " ".join((step.text, asked.text, right, asked.hint, asked.explain))
+
+
+FLAT = {"shape": "flat", "side_x": 0.05, "side_y": 0.05, "force": 0.1, "exaggeration": 10}
+
+
+@pytest.mark.parametrize(
+    ("number", "title", "changes", "figure", "frames", "quoted"),
+    [
+        (1, "Twice the force", {}, "peak_xx", 1, "is -{:.1f} 1/m."),
+        (1, "Twice the force", {"force": 0.3}, "peak_xx", 1, " -{:.1f} 1/m"),
+        (4, "And noise?", {}, "error_rms", 600, "about {:.2f} mm"),
+        (5, "Noisy readings", {"noise_kind": "none"}, "peak_xx", 1, "curvature of {:.0f} 1/m"),
+        (5, "Twice the noise", {}, "error_rms", 200, "about {:.2f} mm"),
+        (5, "Twice the noise", {"noise_kind": "none"}, "error_rms", 1, "noise {:.3f} mm"),
+        (5, "The position of the contact", {}, "contact_sd", 60, "It is {:.1f} mm"),
+        (6, "The remaining error", {}, "error_rms", 1, "from {:.4f} mm"),
+        (7, "A noisy sensor", {}, "error_rms", 400, "Around {:.2f} mm"),
+        (8, "An ideal gage", {}, "error_at_load", 1, "About {:.1f} mm"),
+        (8, "Rising load", {"force": 0.15}, "depth", 1, "about {:.1f} mm"),
+        (9, "The Cram\u00e9r-Rao bound", {}, "contact_sd", 100, "it is {:.2f} mm"),
+        (11, "A whole sensor", {}, "error_rms", 400, "About {:.3f} mm"),
+        (11, "Mend it by software", {"method": "bayes"}, "error_rms", 60, "is {:.2f} mm"),
+        (12, "The same material, flat", FLAT, "depth", 40, "{:.2f} mm. The dome"),
+        (12, "The same material, flat", {}, "depth", 40, "header shows about {:.2f} mm"),
+        (12, "A saddle", {"radius_y": -0.15}, "depth", 40, "{:.2f} mm deep"),
+    ],
+)
+def test_a_lesson_quotes_what_the_window_shows(
+    number: int, title: str, changes: dict[str, object], figure: str, frames: int, quoted: str
+) -> None:
+    unit = 1.0 if figure.startswith("peak") else 1e3
+    found = [OF_AN_ESTIMATE[figure](e) for e in estimates(number, title, changes, frames)]
+    assert quoted.format(abs(unit * sum(found) / frames)) in words(number, title)
+
+
+def test_the_lessons_quote_rates_that_scenes_have() -> None:
+    said, rates = words(6, "Try it"), []
+    for step in read_lesson(READY[5]).steps:
+        if step.title == "Try it":
+            assert step.question is not None
+            assert isinstance(step.question.how, LessonTask)
+            for changes in ({}, step.question.how.solution):
+                rates.append(scene_of(replace(Settings(), **whole({**step.sets, **changes}))).rate)
+    assert "from {:.0f}/s to {:.0f}/s".format(*rates) in said
+
+
+def test_two_fingers_are_told_from_the_distances_that_the_lesson_says() -> None:
+    title = "Two fingers"
+    for apart, told in ((0.01, 1), (0.02, 2), (0.04, 2)):
+        pair = {"load_case": "two-points", "x": 0.05 - apart / 2, "x_end": 0.05 + apart / 2}
+        found = estimates(9, title, pair, 20)
+        assert sum(len(e.contacts) == told for e in found) >= 19, apart
+        assert told == 2 or all(e.contact.single and e.contact.size > 2e-5 for e in found)
+    line = estimates(9, title, {"load_case": "free-line"}, 20)
+    assert not any(e.contact.single for e in line)
+    assert not any(len(e.contacts) == 2 for e in line)
+    assert "20 mm are enough for that. At 10 mm" in words(9, title)
+
+
+def test_as_many_elements_sense_a_load_as_the_lesson_on_domes_says() -> None:
+    title, said = "Fewer elements sense it", words(12, "Fewer elements sense it")
+    for changes, quoted in ((FLAT, "skin {} of 100"), ({}, "dome {} of 100")):
+        (estimate,) = estimates(12, title, {**changes, "noise_kind": "none"})
+        sensed = (np.abs(estimate.curvature) > 3 * 0.231).any(axis=0)
+        assert quoted.format(sensed.sum()) in said
+
+
+def test_stiffness_and_dents_of_domes_are_those_of_the_equation_that_the_lesson_has() -> None:
+    side, R, h, nu = 0.05, 0.15, 0.25e-3, 0.3
+    k = np.arange(1, 241) * math.pi / side
+    k4 = (k[:, None] ** 2 + k**2) ** 2
+    foam = 12 * (1 - nu**2) / (h * R) ** 2  # E h / R^2, over D
+    assert f"{1 + foam / k4[0, 0]:.0f} times as stiff" in words(12, "Stretching")
+    assert 2.7 < foam * R**2 / k4[0, 0] < 3
+    x = np.linspace(side / 2, side, 2501)
+    middle = np.sin(k * side / 2)
+    for stretching, quoted in (
+        (foam, "half as deep {:.1f} mm"),
+        (0.0, "flat skin after {:.0f} mm"),
+    ):
+        w = np.sin(np.outer(x, k)) @ (np.outer(middle, middle) / (k4 + stretching)) @ middle
+        half = x[np.argmax(w < w[0] / 2)] - side / 2
+        assert quoted.format(1e3 * half) in words(12, "A small dent")
+
+
+def test_a_dome_read_as_flat_tells_the_forces_that_the_lesson_says() -> None:
+    title, flat = "A dome read as flat", Patch(0.05, 0.05)
+    read = read_lesson(READY[11])
+    step = [step.title for step in read.steps].index(title)
+    for radius, quoted in ((0.15, "gives {:.3f} N of"), (1.0, "{:.2f} N")):
+        sets = {**read.begins(step), "force": 0.5, "radius_x": radius, "radius_y": radius}
+        scene = scene_of(replace(Settings(), **whole(sets)))
+        sensor, simulator = scene.sensor(), Simulator(scene)
+        plate, layout = replace(sensor.plate, patch=flat), replace(sensor.layout, patch=flat)
+        as_flat = replace(sensor, plate=plate, layout=layout)
+        frames = [replace(simulator.frame(n, lambda: 0.0), truth=None) for n in range(20)]
+        wrong, right = (
+            [pipeline(frame).contact for frame in frames]
+            for pipeline in (Pipeline(each, Setup()) for each in (as_flat, sensor))
+        )
+        assert quoted.format(np.mean([c.force for c in wrong])) in words(12, title)
+    ratio = np.mean([c.position_sd for c in wrong]) / np.mean([c.position_sd for c in right])
+    assert 18 < ratio < 20
+    assert "almost 20 times as uncertain" in words(12, title)
+
+
+def test_readings_of_the_fingertip_have_the_mean_and_the_rms_that_the_lesson_says() -> None:
+    scene = replace(scene_of(replace(Settings(), **whole({"scene": "fingertip"}))), effects=())
+    readings = Pipeline(scene.sensor(), Setup())(Simulator(scene).frame(0, lambda: 0.0)).curvature[
+        0
+    ]
+    assert 4.5 / readings.mean() == pytest.approx(0.9, abs=0.01)
+    rms = np.sqrt(np.mean(readings**2))
+    assert f"RMS of the readings is {rms:.0f} 1/m" in words(7, "A noisy sensor")
 
 
 def test_a_step_without_settings_begins_with_those_of_one_before() -> None:
@@ -329,7 +459,11 @@ def test_the_guide_tells_of_all_there_is_and_its_example_is_a_lesson() -> None:
         assert unit in guide
     lines = guide.split("    +++", 1)[1].split("\nEach step", 1)[0]
     example = lesson_of(textwrap.dedent("    +++" + lines), "example")
-    assert example.steps[0].question is not None
+    question = example.steps[0].question
+    assert question is not None
+    scene = scene_of(replace(Settings(), **whole(example.begins(0))))
+    estimate = Pipeline(scene.sensor(), Setup())(Simulator(scene).frame(0, lambda: 0.0))
+    assert f"{1e3 * estimate.contact.displacement:.1f} mm" in question.explain
 
 
 def test_windows_line_ends_are_read_too() -> None:
