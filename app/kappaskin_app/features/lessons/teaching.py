@@ -87,7 +87,10 @@ class Teaching(QObject):
         history.changed.connect(guarded(lambda *_: self._recent.forget()))
 
     def _receive(self, estimate: Estimate) -> None:
-        if self.progress is not None:
+        """Keep an estimate, unless it may still be of the settings before."""
+        session, status = self._session, self._session.status
+        received = status.requested == session.engine.requested.number
+        if self.progress is not None and received and not (status.computing or session.making):
             self._recent.receive(estimate)
 
     def look(self) -> None:
