@@ -46,10 +46,12 @@ class Contacts:
     """The contacts on a skin: one, or two where the readings tell them apart.
 
     Where the single load that fits best leaves more than the shape does, as one in four at most
-    does by chance, two loads are fitted together, each of its own place, force and size. They are
-    told as two if they are better than one by a likelihood ratio that hardly any single load
-    reaches, better than a line, clear of one another and of the rim, push to the same side, and
-    leave no more than noise does. Otherwise, what one load does not explain is distributed: not
+    does by chance, or a second one beside it would take more off what it leaves than noise offers,
+    two loads are fitted together, each of its own place, force and size. They are told as two if
+    they are better than one by a likelihood ratio that hardly any single load reaches, better than
+    a line, clear of one another and of the rim, push to the same side, leave no more than noise
+    does, and a third load would take far less off that than the second did. Otherwise, what one
+    load does not explain is distributed: not
     `single`. Where one is told or none, a `drift` of all readings may be told beside it
     (`SmoothDrift`). No two are told on a flat skin of known thickness, whose readings are no sums
     of those of its loads.
@@ -83,7 +85,7 @@ class Contacts:
         rest = self._one.rest
         left = float(rest.dot(rest))
         if found[1].present and self._pairs is not None:
-            left = self._pairs.left * self._noise**2
+            left = self._pairs.left
         self.drift = self._drift(curvature, fit, found, rest, left)
         return self.drift.contacts if self.drift else found
 
@@ -96,7 +98,7 @@ class Contacts:
         contact, misfit = self._one(curvature, fit), self._one.misfit
         if not contact.present:
             return contact, NO_CONTACT
-        self._noise = noise = float(fit.noise) * min(math.sqrt(misfit), 1.0)
+        noise = float(fit.noise) * min(math.sqrt(misfit), 1.0)
         if misfit <= left_by_chance(_LOOKED_AT, contact.spare, fit.spare) and (
             self._pairs is None or self._pairs.hint(self._one.rest / (noise or 1.0)) < _HINT
         ):
@@ -282,7 +284,7 @@ class _Pairs:
         self._alone: Single = read.astype(np.float32)
         self._pairs = PatternCache[tuple[Array, Array, Array]]()
         self.left = math.nan
-        """Weighted sum of squares that the last two loads leave of readings over their noise."""
+        """Weighted sum of squares that the last two loads leave of the readings."""
 
     def hint(self, rest: Array) -> float:
         """What another load takes off the sum of squares of the `rest` (C,) at least."""
@@ -318,7 +320,7 @@ class _Pairs:
             return contact, NO_CONTACT
         if self._is_line(two, variance, readings):
             return replace(contact, single=False), NO_CONTACT
-        self.left = two.left
+        self.left = two.left * noise**2
         return self._told(two, spare, fit, noise)
 
     def _explains(self, two: _Tried, spare: int, fit: Fit, gain: float) -> bool:
